@@ -24,6 +24,13 @@ from config.path import PathSpec
 from config.perception import PerceptionConfig
 from config.robot import Robot
 
+# What a robot with a real camera has to be told; each has a default for simulations.
+_OF_A_REAL_ROBOT = {
+    "body": ("width_m", "length_m", "rear_m", "height_m"),
+    "limits": ("max_speed_mps",),
+    "camera_mount": ("forward_m", "height_m", "pitch_deg"),
+}
+
 # Slower, and encoders, status and voltages would grow stale between their turns.
 ROBOCLAW_RATE_HZ = 40.0
 
@@ -191,6 +198,8 @@ class AppConfig(Section):
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
+        if self.camera.kind != "simulated":
+            self._check_real_robot()  # first: a default that does not fit is not the user's mistake
         _check_speeds(self.robot, self.perception)
         _check_range(self.perception, self.decision)
         _check_latency(self.runner, self.decision)
@@ -213,8 +222,6 @@ class AppConfig(Section):
             raise ValueError("a 'governor' hears commands as they come and needs runner.kind 'realtime'")
         if simulated and self.path is not None:
             raise ValueError("a simulation drives the path of its scenario: write it there, not here")
-        if not simulated:
-            self._check_real_robot()
         _check_turns(self.robot, self.chassis)
         if self.runner.kind == "lockstep" and not simulated:
             raise ValueError(
@@ -233,9 +240,13 @@ class AppConfig(Section):
 
     def _check_real_robot(self) -> None:
         """Another robot's size, mounting or speed would be a guess. Raises ValueError."""
-        missing = [
-            name for name in ("body", "limits", "camera_mount") if name not in self.robot.model_fields_set
-        ]
+        missing = []
+        for section, keys in _OF_A_REAL_ROBOT.items():
+            if section not in self.robot.model_fields_set:
+                missing.append(section)
+                continue
+            given = getattr(self.robot, section).model_fields_set
+            missing += [f"{section}.{key}" for key in keys if key not in given]
         if missing:
             raise ValueError(
                 f"camera.kind {self.camera.kind!r} needs robot.{', robot.'.join(missing)}: nothing of a real "

@@ -123,7 +123,8 @@ def _yaml_mistake(error: yaml.YAMLError) -> str:
         return " ".join(str(error).split())
     mark = error.problem_mark or error.context_mark
     where = "" if mark is None else f"line {mark.line + 1}, column {mark.column + 1}: "
-    return f"{where}{error.problem}" + (f" ({error.context})" if error.context else "")
+    advice = "; indent with spaces, not with tabs" if "'\\t'" in error.problem else ""
+    return f"{where}{error.problem}" + (f" ({error.context})" if error.context else "") + advice
 
 
 def describe(error: ValidationError, model: type[BaseModel]) -> str:

@@ -9,7 +9,7 @@ The files and folders in the order in which they come into play:
 * perceive.py - a frame through vision/
 * control.py - one control step, through all files from here to guard.py
 * driven_base.py - the chassis with its pose and its answer; ending.py: how a drive begins and ends
-* localise.py - where the robot is
+* localise.py - where the robot is; contradiction.py - when the images overrule the odometry
 * decision/ - how fast it may go, and why
 * answer.py - whether the base does what it is told
 * shape.py - the jerk-limited setpoint; chassis_lag.py - how much later the base follows

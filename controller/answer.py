@@ -114,7 +114,9 @@ class BaseAnswer:
     def _count(self, commanded_mps: float, measured_mps: float, least_mps: float) -> None:
         clear = least_mps >= _CLEAR_MPS
         runs = measured_mps > min(_FASTEST_SHARE * self._most.value + _FASTEST_MPS, self._too_fast_mps)
-        self._followed = self._followed or (clear and measured_mps >= _FOLLOWS * least_mps)
+        # On a ramp the least is far below the command: a base that tells of half would pass for a follower.
+        most_mps = max(least_mps, commanded_mps)
+        self._followed = self._followed or (clear and measured_mps >= _FOLLOWS * most_mps)
         self._went_back = self._went_back and not self._followed
         self._fell = self._fell + 1 if clear and measured_mps < _FELL * least_mps else 0
         self._behind = self._behind + 1 if clear and measured_mps < _CONTRADICTS * least_mps else 0

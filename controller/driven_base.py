@@ -45,11 +45,16 @@ class DrivenBase:
         return math.nan if self.state is None else self.state.v_mps
 
     def begin(self, scene: Scene | None, now_ns: int) -> None:
-        """Arm the chassis in the first step, and correct the pose by the ego-motion of a new scene."""
+        """Arm the chassis in the first step, and correct the pose by the ego-motion of a new scene.
+
+        Where the images contradict the odometry for long, a stop is requested.
+        """
         self.ending.begin(now_ns)
         if scene is not None and scene.captured_ns != self._scene_ns:
             self._scene_ns = scene.captured_ns
             self.localiser.add_ego_motion(scene.captured_ns, scene.ego_motion)
+            if self.localiser.contradiction:
+                self.ending.request_stop(self.localiser.contradiction, Outcome.BROKEN_OFF)
 
     def answer(self, commanded_mps: float, now_ns: int) -> Answer:
         """Whether the base does what it was told; requests a stop where nothing helps.

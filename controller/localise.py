@@ -22,6 +22,7 @@ from collections import deque
 
 import numpy as np
 
+from controller.contradiction import Contradiction, Motion
 from hal.clocks import NS_PER_S
 from hal.geometry import body_in_floor, camera_in_body, camera_in_floor, wrap_angle_rad
 from hal.types import CameraMount, PlanarPose, Pose
@@ -118,6 +119,7 @@ class Localiser:
         self._camera_in_body = camera_in_body(mount).rotation
         self._odometry = PoseHistory()
         self._fused = PoseHistory()
+        self._contradiction = Contradiction()
         self._last_odometry: PlanarPose | None = None
         self._settled = start
         self._legs: list[tuple[float, float]] = [(0.0, 0.0)]
@@ -133,6 +135,11 @@ class Localiser:
     def yaw_ratio(self) -> float:
         """Estimated share of the odometry's yaw that really happens: 1 - slip."""
         return self._sum_odometry_visual / self._sum_odometry_odometry
+
+    @property
+    def contradiction(self) -> str:
+        """Why the odometry cannot be right, by the images; "" as long as they do not contradict it."""
+        return self._contradiction.sentence
 
     def add_odometry(self, stamp_ns: int, odometry: PlanarPose) -> PlanarPose:
         """Take in the dead reckoning of the chassis at stamp_ns, in its own frame; returns the fused pose.
@@ -152,7 +159,7 @@ class Localiser:
         return self._pose
 
     def add_ego_motion(self, captured_ns: int, ego: EgoMotion) -> None:
-        """Learn from the rotation that the camera saw between the frame before and captured_ns.
+        """Learn from the motion that the camera saw between the frame before and captured_ns.
 
         Motion that is not finite is ignored: the sums would stay NaN for ever.
         """
@@ -160,11 +167,18 @@ class Localiser:
             return
         before = self._odometry.at(captured_ns - round(ego.dt_s * NS_PER_S))
         after = self._odometry.at(captured_ns)
-        if ego.source != "visual" or before is None or after is None or not ego.sigma_rotation_rad > 0.0:
+        seen = ego.source in ("visual", "disputed")
+        if not seen or before is None or after is None or not ego.sigma_rotation_rad > 0.0:
             return
         in_body = self._camera_in_body @ ego.motion.rotation @ self._camera_in_body.T
         visual_rad = math.atan2(in_body[1, 0], in_body[0, 0])
-        odometry_rad = wrap_angle_rad(after.heading_rad - before.heading_rad)
+        distance_m, odometry_rad = _increment(before, after)
+        ahead_m = float(self._camera_in_body[0] @ ego.motion.translation_m)
+        disputed = ego.source == "disputed"
+        told, visual = Motion(distance_m, odometry_rad), Motion(ahead_m, visual_rad)
+        self._contradiction.add(told, visual, disputed=disputed)
+        if disputed:
+            return
         weight = 1.0 / ego.sigma_rotation_rad**2
         self._sum_odometry_visual += weight * odometry_rad * visual_rad
         self._sum_odometry_odometry += weight * odometry_rad**2

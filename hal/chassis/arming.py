@@ -122,6 +122,13 @@ def _next(state: Arming, evidence: Evidence, limits: ArmingLimits) -> Arming:
         # The link may work again while the base does not answer yet.
         answered = evidence.status_ns is not None and evidence.feedback_ns is not None
         return replace(state, cleared=answered and not loss and not evidence.stop_cause)
+    # A loop that stood still has heard nothing meanwhile, and the base is not to blame for that.
+    if (
+        state.mode is ChassisMode.ARMED
+        and not evidence.link_error
+        and (stall := _stall(state, evidence, limits))
+    ):
+        return Arming(ChassisMode.ESTOP, stall, evidence.now_ns)
     if loss:
         return Arming(ChassisMode.LOST, loss, evidence.now_ns)
     if evidence.stop_cause and not (state.mode is ChassisMode.ARMING and evidence.resettable):
@@ -129,7 +136,7 @@ def _next(state: Arming, evidence: Evidence, limits: ArmingLimits) -> Arming:
     if state.mode is ChassisMode.ARMING:
         return _arming(state, evidence, limits)
     if state.mode is ChassisMode.ARMED:
-        return _armed(state, evidence, limits)
+        return _armed(state, evidence)
     if state.mode is ChassisMode.STOPPING and evidence.standing and evidence.command_refusal:
         return Arming(ChassisMode.STANDBY, "stopped", evidence.now_ns)
     return state
@@ -158,19 +165,20 @@ def _arming(state: Arming, evidence: Evidence, limits: ArmingLimits) -> Arming:
     return replace(state, cause=f"arming: {waiting}")
 
 
-def _armed(state: Arming, evidence: Evidence, limits: ArmingLimits) -> Arming:
+def _armed(state: Arming, evidence: Evidence) -> Arming:
     if evidence.command_refusal:
         return Arming(
             ChassisMode.ESTOP, f"the base no longer obeys: {evidence.command_refusal}", evidence.now_ns
         )
-    gap_ns = evidence.now_ns - state.stepped_ns
-    if not 0 <= gap_ns <= limits.max_step_gap_ns:
-        return Arming(
-            ChassisMode.ESTOP,
-            f"the control loop stood still for {gap_ns / NS_PER_MS:.0f} ms",
-            evidence.now_ns,
-        )
     return state
+
+
+def _stall(state: Arming, evidence: Evidence, limits: ArmingLimits) -> str:
+    """That the control loop stood still since the last step; "" if it did not."""
+    gap_ns = evidence.now_ns - state.stepped_ns
+    if 0 <= gap_ns <= limits.max_step_gap_ns:
+        return ""
+    return f"the control loop stood still for {gap_ns / NS_PER_MS:.0f} ms"
 
 
 def _refusal(state: Arming, evidence: Evidence, limits: ArmingLimits) -> str:

@@ -41,6 +41,11 @@ _LAG_NS = 6 * NS_PER_S
 # The reported speed is averaged over windows of this length; two in a row must exceed the limit.
 _WINDOW_NS = NS_PER_S // 2
 
+# Least speed that may be reported: this share of the least command of the last windows, less a constant; two
+# windows in a row must be below the limit. In that time a base that lags by 2 s reaches three quarters of a
+# command. Counters with half the scale would take the robot twice as far as its path goes.
+_MIN_SPEED_SHARE, _MIN_SPEED_LESS_MPS, _SLOW_WINDOWS = 0.6, 0.03, 6
+
 # A base that lags by 2 s has slowed to a fiftieth when it has been commanded to stand for _REST_NS. From then
 # on it may move no faster than a base that rolls back (rolling_back.py). Whoever pushes or turns it by hand,
 # by more than 5 cm or 10 degrees in a second, latches it, too: a motor that runs away is reported the same.
@@ -71,7 +76,9 @@ class Following:
         self._commanded_rad = self._turning_rad = self._reported_rad = 0.0
         self._orders: deque[_Ordered] = deque()
         self._window_began_ns, self._window_m, self._window_rad = 0, 0.0, 0.0
-        self._too_fast = self._turns_too_fast = False
+        self._too_fast = self._turns_too_fast = self._too_slow = False
+        self._min_command_mps = math.inf
+        self._min_commands_mps: deque[float] = deque(maxlen=_SLOW_WINDOWS)
 
     def step(self, pose: PlanarPose, now_ns: int) -> None:
         """Compare what the base has reported since the last step with what was commanded meanwhile."""
@@ -82,11 +89,12 @@ class Following:
             self.sentence = ""
             self._restart(now_ns)
             self._begin_window(now_ns)
-            self._too_fast = self._turns_too_fast = False
+            self._too_fast = self._turns_too_fast = self._too_slow = False
+            self._min_commands_mps.clear()
             return
         way_m = _way_m(before, pose)
         turn_rad = wrap_angle_rad(pose.heading_rad - before.heading_rad)
-        excess = self._excess(way_m, turn_rad, now_ns)
+        excess = self._out_of_limits(way_m, turn_rad, now_ns)
         if is_zero(self._ordered):
             self.sentence = excess
             self._restart(now_ns)
@@ -116,14 +124,15 @@ class Following:
         """
         order = self._ordered
         mps, radps = (0.0, 0.0) if order is None else (abs(order.v_mps), abs(order.w_radps))
+        self._min_command_mps = min(self._min_command_mps, mps)
         if self._orders and self._orders[-1][1:] == (mps, radps):
             self._orders.pop()
         self._orders.append(_Ordered(now_ns, mps, radps))
         while self._orders[0].until_ns < self._window_began_ns - _REST_NS:
             self._orders.popleft()
 
-    def _excess(self, way_m: float, turn_rad: float, now_ns: int) -> str:
-        """What is wrong if the base reports a speed or yaw rate above the limit; "" if it does not.
+    def _out_of_limits(self, way_m: float, turn_rad: float, now_ns: int) -> str:
+        """What is wrong if the base reports a speed or yaw rate beyond the limits; "" if it does not.
 
         way_m, turn_rad: reported since the last step.
         """
@@ -143,13 +152,23 @@ class Following:
         max_radps = _MAX_SHARE * radps + slack_mps / _ARM_M
         before, self._turns_too_fast = self._turns_too_fast, reported_radps > max_radps
         turns_too_fast = before and self._turns_too_fast
+        min_mps, too_slow = self._much_too_slow(reported_mps)
         self._begin_window(now_ns)
         stood = mps == 0.0 and radps == 0.0
         if too_fast:
             return _excess_text(f"{reported_mps:.2f} m/s", f"{mps:.2f} m/s", stood)
         if turns_too_fast:
             return _excess_text(f"{reported_radps:.2f} rad/s", f"{radps:.2f} rad/s", stood)
-        return ""
+        return _shortfall_text(reported_mps, min_mps) if too_slow else ""
+
+    def _much_too_slow(self, reported_mps: float) -> tuple[float, bool]:
+        """The least command of the last windows, and whether the base reports much less."""
+        self._min_commands_mps.append(self._min_command_mps)
+        min_mps = min(self._min_commands_mps)
+        full = len(self._min_commands_mps) == _SLOW_WINDOWS
+        slow = full and reported_mps < _MIN_SPEED_SHARE * min_mps - _MIN_SPEED_LESS_MPS
+        before, self._too_slow = self._too_slow, slow
+        return min_mps, before and slow
 
     def _shortfall(self, seconds: float) -> str:
         """What is wrong if the base has moved too little or turned otherwise in these seconds, else ""."""
@@ -167,6 +186,7 @@ class Following:
 
     def _begin_window(self, now_ns: int) -> None:
         self._window_began_ns, self._window_m, self._window_rad = now_ns, 0.0, 0.0
+        self._min_command_mps = math.inf
 
     def _restart(self, now_ns: int) -> None:
         self._since_ns = now_ns
@@ -189,3 +209,10 @@ def _excess_text(told: str, commanded: str, stood: bool) -> str:
         else "are the scales of its speed and of its counters right in chassis:?"
     )
     return f"the base does not follow: it tells of {told} while at most {commanded} was commanded; {ask}"
+
+
+def _shortfall_text(reported_mps: float, min_mps: float) -> str:
+    return (
+        f"the base does not follow: it tells of {reported_mps:.2f} m/s while at least {min_mps:.2f} m/s was "
+        "commanded for 3 s; is the scale of its counters right in chassis:, and can its motors go that fast?"
+    )

@@ -148,6 +148,21 @@ def test_nothing_of_a_real_robot_is_guessed(section: str, tmp_path: Path) -> Non
         load_app(changed)
 
 
+@pytest.mark.parametrize(
+    "key", ["body.width_m", "body.height_m", "limits.max_speed_mps", "camera_mount.height_m"]
+)
+def test_not_one_key_of_a_real_robot_is_guessed(key: str, tmp_path: Path) -> None:
+    """The default is another robot's width: a wider one would graze what it is told to pass."""
+    content = yaml.safe_load((CONFIG_DIR / "robot-kobuki.yaml").read_text())
+    section, name = key.split(".")
+    del content["robot"][section][name]
+    changed = tmp_path / "robot.yaml"
+    changed.write_text(yaml.safe_dump(content))
+    with pytest.raises(ConfigError) as refused:
+        load_app(changed)
+    assert f"'realsense' needs robot.{key}: nothing of a real robot" in str(refused.value)
+
+
 @pytest.mark.parametrize("path", sorted(CONFIG_DIR.glob("robot-*.yaml")), ids=lambda path: path.stem)
 def test_the_files_to_start_from_are_right(path: Path) -> None:
     assert load_app(path).simulation is None

@@ -74,6 +74,7 @@ def test_every_mistake_is_named_with_its_key(tmp_path: Path) -> None:
             "a: 1\n\tb: 2",
             "not valid YAML: line 2, column 1: found character '\\t' that cannot start any token",
         ),
+        ("a: 1\n\tb: 2", "; indent with spaces, not with tabs"),
         ("count: 2020-13-45", "line 1, column 8: '2020-13-45' is no timestamp; put text in quotes"),
         ("count: " + "9" * 5000, "is no int"),
         ("count: !!timestamp soon", "'soon' is no timestamp"),

@@ -78,6 +78,12 @@ def test_a_base_that_never_hears_is_not_asked_for_more_and_more() -> None:
     assert taken[-1].setpoint.v_mps == pytest.approx(0.2, abs=0.01)
 
 
+def test_a_base_that_tells_of_less_than_half_is_not_told_zero_every_few_seconds() -> None:
+    """It never fell. hal/chassis/following.py latches it once it has been told to drive on for 3 s."""
+    taken = driven(ImperfectBase(gain=0.45), 12.0)[0]
+    assert not [step for step in taken if step.unanswered]
+
+
 @pytest.mark.parametrize("gain", [2.0, 6.0])
 def test_a_base_that_runs_away_is_not_told_to_go_faster(gain: float) -> None:
     base = ImperfectBase(gain=gain)

@@ -139,6 +139,14 @@ def test_a_control_loop_that_stood_still_latches(now_ms: int, reason: str) -> No
     assert (state.mode, state.reason) == (ChassisMode.ESTOP, reason)
 
 
+def test_a_loop_that_stood_still_is_named_and_not_the_base_that_it_did_not_ask() -> None:
+    """A RoboClaw says nothing without being asked, so its feedback has grown old, too."""
+    state = step(armed(), at(2040, feedback_ns=40 * MS, status_ns=40 * MS), LIMITS)
+    assert (state.mode, state.reason) == (ChassisMode.ESTOP, "the control loop stood still for 2000 ms")
+    state = step(armed(), at(2040, link_error="unplugged"), LIMITS)
+    assert (state.mode, state.reason) == (ChassisMode.LOST, "unplugged")
+
+
 def test_limits_themselves_are_still_good() -> None:
     state = step(armed(), at(240, feedback_ns=40 * MS, status_ns=40 * MS), LIMITS)
     assert state.may_move

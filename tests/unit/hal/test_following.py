@@ -114,9 +114,28 @@ def test_a_base_that_does_more_than_it_is_told_is_noticed_before_it_has_gone_far
     assert noticed_s < 4.5  # 2.5 s of which it still gets faster
 
 
-@pytest.mark.parametrize(("scale", "lag_s"), [(1.0, 0.2), (1.0, 2.0), (1.3, 0.2), (0.5, 0.2)])
+@pytest.mark.parametrize(("scale", "lag_s"), [(1.0, 0.2), (1.0, 2.0), (1.3, 0.2), (0.7, 0.2), (0.75, 2.0)])
 def test_a_base_that_does_about_what_it_is_told_is_not(scale: float, lag_s: float) -> None:
     assert seconds_until_too_fast(scale, 0.75, lag_s) is None
+
+
+def test_counters_with_half_the_scale_are_noticed_before_the_robot_has_gone_twice_as_far() -> None:
+    noticed_s = seconds_until_too_fast(0.5, 0.75)
+    assert noticed_s is not None
+    assert noticed_s < 2.5 + 4.5  # the ramp, 3 s at full speed, and two glances
+
+
+def test_the_sentence_of_a_slow_base_names_both_speeds() -> None:
+    following = Following()
+    for period in range(300):
+        following.step(PlanarPose(0.01 * period, 0.0, 0.0), period * PERIOD_NS)
+        if following.sentence:
+            break
+        following.ordered(Setpoint(period * PERIOD_NS, 1.0, 0.0, 0.0))
+    assert following.sentence == (
+        "the base does not follow: it tells of 0.50 m/s while at least 1.00 m/s was commanded for 3 s; "
+        "is the scale of its counters right in chassis:, and can its motors go that fast?"
+    )
 
 
 def test_what_a_base_coasts_after_faster_orders_is_not_too_fast() -> None:

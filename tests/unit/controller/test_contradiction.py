@@ -1,0 +1,110 @@
+"""A base that goes elsewhere than it tells, as the images show: by itself, and as the end of a drive."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from controller.contradiction import Contradiction, Motion
+from controller.control import ControlStep
+from controller.ending import Outcome
+from hal.geometry import camera_in_body
+from hal.types import Pose
+from tests.support.obedient_chassis import PERIOD_S, ObedientChassis
+from tests.support.scenes import scene
+from tests.unit.controller.governor.test_loop import Rig
+from tests.unit.controller.test_control import MOUNT, PERIOD_NS, loop_on
+from vision.scene import EgoMotion, Scene
+
+FRAME_S = 1.0 / 30.0
+
+
+def told_after(
+    told_mps: float, seen_mps: float, told_radps: float = 0.0, seen_radps: float = 0.0, disputed_of: int = 1
+) -> tuple[float, str] | None:
+    """When that is noticed, at most after a minute, and what is said. Each disputed_of-th frame is."""
+    contradiction = Contradiction()
+    for k in range(60 * 30):
+        disputed = k % disputed_of == 0
+        told = Motion(told_mps * FRAME_S, told_radps * FRAME_S)
+        seen = Motion(seen_mps * FRAME_S, seen_radps * FRAME_S) if disputed else told
+        contradiction.add(told, seen, disputed=disputed)
+        if contradiction.sentence:
+            return k * FRAME_S, contradiction.sentence
+    return None
+
+
+@pytest.mark.parametrize(
+    ("told_mps", "seen_mps", "seen_radps", "within_s"),
+    [
+        (0.5, -0.5, 0.0, 0.5),  # both motors mirrored, and their encoders
+        (0.2, 0.0, 0.5, 1.0),  # one of them
+        (0.5, 1.0, 0.0, 1.5),  # counters with half the scale
+        (0.5, 0.0, 0.0, 1.5),  # tracks that spin on the spot
+    ],
+)
+def test_going_elsewhere_is_noticed(
+    told_mps: float, seen_mps: float, seen_radps: float, within_s: float
+) -> None:
+    noticed = told_after(told_mps, seen_mps, 0.0, seen_radps)
+    assert noticed is not None
+    assert noticed[0] < within_s
+
+
+@pytest.mark.parametrize(
+    ("told", "seen"),
+    [
+        ((0.5, 0.0), (0.4, 0.0)),  # tracks that slip somewhat
+        ((0.3, 0.8), (0.3, 0.5)),  # more so in a turn
+        ((0.0, 0.0), (-1.5, 0.0)),  # a lorry that sets off before a robot that stands
+    ],
+)
+def test_slip_and_what_passes_a_standing_robot_are_not(
+    told: tuple[float, float], seen: tuple[float, float]
+) -> None:
+    assert told_after(told[0], seen[0], told[1], seen[1]) is None
+
+
+def test_a_vehicle_that_fills_the_view_now_and_then_is_not() -> None:
+    assert told_after(0.5, 0.0, disputed_of=5) is None
+
+
+def test_the_sentence_names_both_motions_and_what_to_look_at() -> None:
+    noticed = told_after(0.6, -0.6)
+    assert noticed is not None
+    assert noticed[1] == (
+        "the camera sees -0.22 m ahead and +0.00 rad where the base tells of +0.22 m and +0.00 rad; do its "
+        "motors turn the right way, are its scales right in chassis:, do its tracks slip?"
+    )
+
+
+def sees_it_go_back(now_ns: int, index: int, v_mps: float) -> Scene:
+    """As far back as the base tells of going ahead."""
+    back_m = camera_in_body(MOUNT).rotation.T @ np.array([-v_mps * PERIOD_S, 0.0, 0.0])
+    ego = EgoMotion(Pose(np.eye(3), back_m), PERIOD_S, "disputed", 0.95, 0.001, 0.001)
+    return replace(scene(now_ns, index), ego_motion=ego)
+
+
+def test_it_ends_the_drive_before_the_robot_has_gone_far_and_says_why() -> None:
+    loop, steps = loop_on(ObedientChassis(), 10.0), list[ControlStep]()
+    while not loop.finished and len(steps) < 1000:
+        k, v_mps = len(steps), steps[-1].setpoint.v_mps if steps else 0.0
+        steps.append(loop.step(sees_it_go_back(k * PERIOD_NS, k, v_mps), k * PERIOD_NS))
+    assert loop.ending.outcome is Outcome.BROKEN_OFF
+    assert "do its motors turn the right way" in (loop.ending.stop_reason or "")
+    assert steps[-1].progress_m < 1.0
+
+
+def test_it_ends_a_governed_drive_too() -> None:
+    rig = Rig()
+    rig.run(2.0)
+    for k in range(len(rig.steps), len(rig.steps) + 500):
+        rig.steps.append(
+            rig.loop.step(sees_it_go_back(k * PERIOD_NS, k, rig.steps[-1].setpoint.v_mps), k * PERIOD_NS)
+        )
+        if rig.loop.finished:
+            break
+    assert rig.loop.ending.outcome is Outcome.BROKEN_OFF
+    assert "do its motors turn the right way" in (rig.loop.ending.stop_reason or "")
