@@ -1,5 +1,5 @@
 """The release gate: slower at once, faster only after a delay, so that noisy limits cause no jerky drive.
-The start delay: a standing robot waits until what stood in its way has certainly gone.
+The start delay: a standing robot waits until what comes and goes in its way has certainly gone.
 
 controller/decision/decide.py passes the least limit through them in each control step.
 """
@@ -13,25 +13,31 @@ from config.decision import Release
 from controller.decision.limits import STANDING_MPS
 from hal.clocks import NS_PER_S
 
-# What stood in the way of a standing robot must have been out of sight this long before it starts. Something
-# low at the lower edge of the view is seen in some frames only, with gaps of up to half a second; the robot
-# would creep on in each gap until it is below the view. What goes away is seen to move.
+# Something low at the lower edge of the view is seen in some frames only, with gaps of up to half a second.
+# The robot would creep on in each gap until the obstacle is below the view. So what has come back within
+# _AGAIN_S must have been out of sight for _GONE_S before the robot starts.
+_AGAIN_S = 5.0
 _GONE_S = 1.0
 
 
 class StartDelay:
-    """Keeps a standing robot standing for _GONE_S after something last stood in its way."""
+    """Keeps a standing robot standing for _GONE_S after something that comes and goes stood in its way."""
 
     def __init__(self) -> None:
         self._blocked_ns: int | None = None
+        self._free = True
+        self._flickers = False
 
-    def step(self, blocked: bool, v_mps: float, now_ns: int) -> bool:
+    def step(self, blocked: bool, now_ns: int) -> bool:
         """Whether the robot must not start yet. blocked: something that does not move makes it stand."""
-        if v_mps > STANDING_MPS:
-            self._blocked_ns = None
-        elif blocked:
-            self._blocked_ns = now_ns
-        return self._blocked_ns is not None and (now_ns - self._blocked_ns) / NS_PER_S < _GONE_S
+        free_s = math.inf if self._blocked_ns is None else (now_ns - self._blocked_ns) / NS_PER_S
+        if blocked:
+            came_back = self._free and free_s < _AGAIN_S
+            self._flickers, self._blocked_ns = self._flickers or came_back, now_ns
+        elif free_s >= _AGAIN_S:
+            self._flickers = False
+        self._free = not blocked
+        return self._free and self._flickers and free_s < _GONE_S
 
 
 class _RunningMin:
