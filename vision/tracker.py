@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import PerceptionConfig
-from hal.types import PlanarPose
+from hal.types import FloatArray, PlanarPose
 from vision.bodies import (
     births,
     carving,
@@ -26,7 +26,7 @@ from vision.bodies import (
     votes,
 )
 from vision.bodies.adoption import adopt, inherited
-from vision.bodies.arrivals import Changes, ViewMemory
+from vision.bodies.arrivals import Changes, ViewMemory, arriving
 from vision.bodies.judgement import judge
 from vision.bodies.tracks import Tracks
 from vision.depth import connected, regions
@@ -232,8 +232,8 @@ class Tracker:
             tracks.state[use], tracks.covariance[use] = kalman.update(
                 tracks.state.take(use, axis=0), tracks.covariance.take(use, axis=0), velocity, noise, 3
             )
-        longer = np.where(limbs.restless(body), detection.dt_s, -detection.dt_s)
-        tracks.restless_s = np.maximum(tracks.restless_s + longer, 0.0)
+        tracks.restless_s = _sustained(tracks.restless_s, limbs.restless(body), detection.dt_s)
+        tracks.arriving_s = _sustained(tracks.arriving_s, arriving(arrivals, cells), detection.dt_s)
         advances = tracks.update_trailing_average(detection.dt_s)
         seen = evidence_of(tracks, detection, body, advances, arrivals, cells, self._config.depth_noise)
         verdict = judge(seen, tracks.evidence, tracks.moving, detection.dt_s, settings)
@@ -277,3 +277,8 @@ class Tracker:
             above_floor if grid.height_m is None else above_floor & (grid.height_m < self._body_height_m)
         )
         return free_space(grid, in_the_way, self._config.max_depth_m, measurable_from_m)
+
+
+def _sustained(so_far_s: FloatArray, holds: NDArray[np.bool_], dt_s: float) -> FloatArray:
+    """(T,) time in which a condition held, less the time in which it did not, after a further frame."""
+    return np.maximum(so_far_s + np.where(holds, dt_s, -dt_s), 0.0)

@@ -216,6 +216,7 @@ def any_evidence(seed: int, count: int, trusted: bool) -> MotionEvidence:
         agreement=rng.uniform(0.0, 1.0, count),
         restless=rng.random(count) < 0.5,
         restless_s=rng.uniform(0.0, 1.0, count),
+        arriving_s=rng.uniform(0.0, 0.3, count),
         arrived=rng.integers(0, 40, count),
         cells=rng.integers(40, 200, count),
         size_m=rng.uniform(0.0, 4.0, count),

@@ -48,6 +48,7 @@ def one(velocity: Speed = STILL, **changes: Any) -> MotionEvidence:
         agreement=np.array([0.0]),
         restless=np.array([False]),
         restless_s=np.array([0.0]),
+        arriving_s=np.array([0.0]),
         arrived=np.array([0]),
         cells=np.array([100]),
         size_m=np.array([0.8]),

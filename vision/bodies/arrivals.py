@@ -39,8 +39,19 @@ _SIGMAS = 3.5  # of the difference compared: exceeded by chance in 2 of 10000 ce
 # floor, the factor is CELL_HEIGHT_NOISE (vision/depth/depth_grid.py).
 _CELL_NOISE_OVER_TIME = 0.55
 _NEIGHBOURS = 5  # at least this many of a cell and its eight neighbours must have arrived
+# Of one surface: fewer arrived cells, or a smaller share of it, come and go with noise at a rim. A walking
+# person arrives with one side.
+ARRIVED_CELLS, ARRIVED_SHARE = 8, 0.05
+MUCH_ARRIVED_CELLS = 20  # about a forearm 4 m away
+MUCH_ARRIVED_SHARE = 0.2  # more than a rim that noise widens
 _UNKNOWN = np.float32(1e3)  # 1/m, where nothing was measured: no surface is nearer, so none can arrive there
 _BLOCK = np.ones((3, 3), np.uint8)
+
+
+def arriving(arrived: NDArray[np.intp], cells: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """(T,) surfaces of which enough of the cells (T,) have arrived (T,)."""
+    result: NDArray[np.bool_] = (arrived >= ARRIVED_CELLS) & (arrived >= ARRIVED_SHARE * cells)
+    return result
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,7 +12,8 @@ squared; ends: end points of the track's fragments):
   no common velocity, as the ends on limbs. The filtered velocity needs to exceed half of the threshold only,
   after 0.4 s a quarter.
 * Arrival (_by_arrival): part of the surface is where free space was seen. Half of the threshold suffices.
-  Where much of the surface has arrived, that alone is proof, except for a mover that has just stopped.
+  Where much of the surface has arrived, or some of it in each of several frames, that alone is proof, except
+  for what has just stopped.
 * Surface (_by_surface): the centre of a whole, compact surface moves for longer and more clearly than a
   change of viewpoint or a growing surface explains.
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from config.perception import MotionSettings
 from hal.compiled import compiled, inlined
 from hal.types import FloatArray
+from vision.bodies.arrivals import ARRIVED_CELLS, ARRIVED_SHARE, MUCH_ARRIVED_CELLS, MUCH_ARRIVED_SHARE
 from vision.motion.line_of_sight import decompose, second_opinion
 from vision.motion.motion_evidence import MotionEvidence
 
@@ -29,10 +30,7 @@ _LIKELY_SHARE = 0.25  # of the threshold, 2 of 4 sigmas: a slow machine on legs 
 _FRAME_PROOF = 3.0  # squared sigmas of this frame, so that the proof does not rest on the past only
 _SHARED_PROOF = 0.55  # of the threshold, where the surface confirms the velocity of the fragments
 _SPEED_PER_METRE = 0.02  # m/s more minimum speed per metre of distance, since all errors grow with it
-_ARRIVED_CELLS = 8  # fewer arrived cells come and go with noise at a rim
-_ARRIVED_SHARE = 0.05  # of the surface: a walking person arrives with one side
-MUCH_ARRIVED_CELLS = 20  # about a forearm 4 m away
-_MUCH_SHARE = 0.2  # of the surface: more than a rim that noise widens
+_LASTING_ARRIVAL_S = 0.12  # of no static surface do enough cells arrive in two successive frames
 _STANDING_SHARE = 0.6  # of the minimum speed: a slower track stands still
 _KNOWN_SPEED = 2.0  # times the minimum speed: if sigma is less, a mover below the minimum has stopped
 _MEASURED_ACROSS_S = 0.25  # static surfaces seldom show a false speed across the line of sight for longer
@@ -170,12 +168,6 @@ def _still_moves(filtered: _Velocity, advances: bool, arrived: bool, least_mps: 
 
 
 @inlined
-def _one_fragment_moves(filtered: _Velocity, frame: _Velocity, agreeing: float, threshold: float) -> bool:
-    """Whether one fragment alone shows motion: no proof, but a reason to keep what more of them showed."""
-    return _shown_across(filtered, frame, threshold) and agreeing >= 2
-
-
-@inlined
 def _surely_static(frame: _Velocity, agreeing: float, least_mps: float) -> bool:
     """Whether this frame's fragments are sure that the track stands still."""
     slow = frame.speed_mps < _STANDING_SHARE * least_mps
@@ -193,8 +185,8 @@ def _entry(velocity: FloatArray, covariance: FloatArray, parts: FloatArray, k: i
 
 @compiled(
     "float64[:, :, ::1], float64[:, :, :, ::1], float64[:, :, ::1], boolean[:, ::1], float64[:], int64[:],"
-    "float64[:], boolean[:], float64[:], int64[:], int64[:], float64[:], float64[:], float64[:], float64[:],"
-    "boolean[:], boolean[:], boolean[:], boolean, float64, float64, float64"
+    "float64[:], boolean[:], float64[:], int64[:], float64[:], int64[:], float64[:], float64[:], float64[:],"
+    "float64[:], boolean[:], boolean[:], boolean[:], boolean, float64, float64, float64"
 )
 def _proofs(
     velocity: FloatArray,
@@ -207,6 +199,7 @@ def _proofs(
     restless: BoolArray,
     restless_s: FloatArray,
     arrived: NDArray[np.intp],
+    arriving_s: FloatArray,
     cells: NDArray[np.intp],
     size_m: FloatArray,
     velocity_measured_s: FloatArray,
@@ -234,8 +227,9 @@ def _proofs(
         agreeing = alike if agreement[t] >= _MIN_AGREEMENT else 0.0
         track_ends = _Ends(ends[t], agreeing, restless[t], restless_s[t])
         seen = _Surface(cells[t], size_m[t], velocity_measured_s[t], wander_mps[t], depth_sigma_m[t])
-        some = arrived[t] >= _ARRIVED_CELLS and arrived[t] >= _ARRIVED_SHARE * cells[t]
-        much = arrived[t] >= MUCH_ARRIVED_CELLS and arrived[t] >= _MUCH_SHARE * cells[t]
+        some = arrived[t] >= ARRIVED_CELLS and arrived[t] >= ARRIVED_SHARE * cells[t]
+        lasting = some and arriving_s[t] >= max(_LASTING_ARRIVAL_S, _MEASURED_FRAMES * dt_s)
+        much = arrived[t] >= MUCH_ARRIVED_CELLS and arrived[t] >= MUCH_ARRIVED_SHARE * cells[t]
         possible = filtered.speed_mps <= fastest_mps and size_m[t] <= _LARGEST_M
         fast = filtered.speed_mps > least_mps[t]
         evident = (
@@ -245,8 +239,10 @@ def _proofs(
             or _by_surface(centre, seen, least_mps[t], dt_s, threshold)
         )
         # The place where a mover has stopped was free a moment ago, so its arrival there is no proof.
-        stopped = moving[t] and not fast and filtered.sigma_mps < _KNOWN_SPEED * least_mps[t]
-        moves[t] = trusted and possible and ((evident and fast) or (much and not stopped))
+        stands = not fast and filtered.sigma_mps < _KNOWN_SPEED * least_mps[t]
+        stopped = moving[t] and stands
+        came = (much and not stopped) or (lasting and not stands)
+        moves[t] = trusted and possible and ((evident and fast) or came)
         shown = np.minimum(np.maximum(filtered.along, filtered.across), np.maximum(frame.along, frame.across))
         strength[t] = np.minimum(shown / threshold, agreeing / _ENDS_ACROSS)
         surely_static[t] = _surely_static(frame, agreeing, least_mps[t])
@@ -255,7 +251,8 @@ def _proofs(
         slow = filtered.speed_mps < _STANDING_SHARE * least_mps[t]
         over[t] = surely_static[t] or (stopped and slow) or lost
         still_moves = moving[t] and _still_moves(filtered, advances[t], some, least_mps[t])
-        one_moves = possible and fast and _one_fragment_moves(filtered, frame, alike, threshold)
+        # One fragment alone is no proof, but a reason to keep what more of them showed.
+        one_moves = possible and fast and alike >= 2 and _shown_across(filtered, frame, threshold)
         goes_on[t] = still_moves or one_moves or (restless[t] and not moving[t])
     return moves, strength, surely_static, over, goes_on
 
@@ -284,6 +281,7 @@ def prove(
         seen.restless,
         seen.restless_s,
         seen.arrived,
+        seen.arriving_s,
         seen.cells,
         seen.size_m,
         seen.velocity_measured_s,

@@ -63,6 +63,8 @@ class Tracks:
         self.unproven_s = np.empty(0)  # since a frame last proved that it moves, or since its birth
         # Time in which nearly all ends contradicted standing still, less the time in which they did not.
         self.restless_s = np.empty(0)
+        # Time in which part of the surface was newly arrived, less the time in which none was.
+        self.arriving_s = np.empty(0)
         self._fields = tuple(vars(self))
         self._next_id = 1
 

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.compiled import compiled
-from vision.bodies.proof import MUCH_ARRIVED_CELLS
+from vision.bodies.arrivals import MUCH_ARRIVED_CELLS
 from vision.depth.connected import IntGrid, spread_labels
 from vision.depth.depth_grid import BoolGrid
 

@@ -38,6 +38,7 @@ class MotionEvidence:
     restless: most ends contradict standing still, whether they agree with each other or not.
     restless_s: for how long the track has been restless.
     arrived, cells: of the surface.
+    arriving_s: for how long part of the surface has been newly arrived.
     size_m: largest extent of the surface.
     velocity_measured_s: for how long the centre has measured the velocity without a break.
     view_radps: how fast the viewing direction changes.
@@ -64,6 +65,7 @@ class MotionEvidence:
     restless: NDArray[np.bool_]
     restless_s: FloatArray
     arrived: NDArray[np.intp]
+    arriving_s: FloatArray
     cells: NDArray[np.intp]
     size_m: FloatArray
     velocity_measured_s: FloatArray
@@ -107,6 +109,7 @@ def evidence_of(
         restless=restless(body),
         restless_s=tracks.restless_s,
         arrived=arrived,
+        arriving_s=tracks.arriving_s,
         cells=cells,
         size_m=tracks.extent_m.max(axis=1),
         velocity_measured_s=tracks.velocity_measured_s,

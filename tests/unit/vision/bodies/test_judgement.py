@@ -186,12 +186,25 @@ def test_much_that_came_before_it_stopped_is_no_proof_that_it_still_goes() -> No
     assert verdict(replace(came, covariance=covariance(0.055)), 1.0, True).evidence[0] < 1.0
 
 
+def test_a_part_that_arrives_in_several_frames_is_proof_without_a_known_velocity() -> None:
+    unknown = {"covariance": covariance(1.0), "arrived": np.array([8]), "cells": np.array([160])}
+    assert rises(one(STILL, **unknown, arriving_s=np.array([0.13])))
+    assert not rises(one(STILL, **unknown, arriving_s=np.array([0.12])))
+    # Not where nothing arrives in this frame, nor too small a share, nor for what is known to stand still.
+    assert not rises(one(STILL, **{**unknown, "arrived": np.array([7])}, arriving_s=np.array([0.2])))
+    assert not rises(one(STILL, **{**unknown, "cells": np.array([161])}, arriving_s=np.array([0.2])))
+    assert not rises(one(STILL, **{**unknown, "covariance": covariance(0.01)}, arriving_s=np.array([0.2])))
+
+
 EVIDENT = {
     "fragments across": by_fragments(ACROSS, 20),
     "fragments along": by_fragments(ALONG, 20),
     "surface": by_surface(ACROSS, 1.0),
     "arrival": one(ACROSS, arrived=np.array([10])),
     "much has come": one(STILL, arrived=np.array([60])),
+    "lasting arrival": one(
+        STILL, covariance=covariance(1.0), arrived=np.array([10]), arriving_s=np.array([0.2])
+    ),
 }
 
 
