@@ -132,8 +132,8 @@ class DecisionMaker:
         top_mps = self._robot.limits.max_speed_mps
         least = _least(limits)
         raw_mps = self._start_or_creep(least, motion)
-        blocked = raw_mps <= 0.0 and least.reason.rule in STANDING_RULES
-        waits = self._start_delay.step(blocked, now_ns)
+        blocked = raw_mps <= 0.0
+        waits = self._start_delay.step(blocked, blocked and least.reason.rule in STANDING_RULES, now_ns)
         watched: Reason | None = None
         let_go_mps = max(motion.v_mps - motion.a_mps2**2 / (2.0 * self._comfort.jerk_mps3), 0.0)
         if raw_mps < min(top_mps, on_way.speed_mps):

@@ -24,20 +24,24 @@ class StartDelay:
     """Keeps a standing robot standing for _GONE_S after something that comes and goes stood in its way."""
 
     def __init__(self) -> None:
-        self._blocked_ns: int | None = None
+        self._stood_ns: int | None = None
         self._free = True
         self._flickers = False
 
-    def step(self, blocked: bool, now_ns: int) -> bool:
-        """Whether the robot must not start yet. blocked: something that does not move makes it stand."""
-        free_s = math.inf if self._blocked_ns is None else (now_ns - self._blocked_ns) / NS_PER_S
-        if blocked:
-            came_back = self._free and free_s < _AGAIN_S
-            self._flickers, self._blocked_ns = self._flickers or came_back, now_ns
-        elif free_s >= _AGAIN_S:
+    def step(self, blocked: bool, stands: bool, now_ns: int) -> bool:
+        """Whether the robot must not start yet.
+
+        blocked: something makes it stand. stands: that does not move. Something that is in the way until it
+        leaves, first standing and then moving, has not come back.
+        """
+        since_s = math.inf if self._stood_ns is None else (now_ns - self._stood_ns) / NS_PER_S
+        if stands:
+            self._flickers = self._flickers or (self._free and since_s < _AGAIN_S)
+            self._stood_ns = now_ns
+        elif since_s >= _AGAIN_S:
             self._flickers = False
         self._free = not blocked
-        return self._free and self._flickers and free_s < _GONE_S
+        return self._free and self._flickers and since_s < _GONE_S
 
 
 class _RunningMin:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from config.decision import Release
-from controller.decision.release import ReleaseGate
+from controller.decision.release import ReleaseGate, StartDelay
 
 STEP_NS = 20_000_000
 STEP_S = 0.02
@@ -170,3 +170,19 @@ def test_a_stop_from_a_crawl_is_a_turn_too() -> None:
     while gate.step(0.5) <= 0.0:
         assert gate.now_ns - began < 3e9
     assert (gate.now_ns - began) / 1e9 > 1.9
+
+
+def test_only_what_comes_back_after_the_way_was_free_delays_the_start() -> None:
+    """Steps of 0.1 s: in each, whether something blocks the way, and whether that stands."""
+    stands, goes, free = (True, True), (True, False), (False, False)
+
+    def waits(*steps: tuple[bool, bool]) -> list[bool]:
+        delay = StartDelay()
+        return [delay.step(blocked, still, k * 100_000_000) for k, (blocked, still) in enumerate(steps)]
+
+    assert not any(waits(*[stands] * 3, *[free] * 3))
+    assert not any(waits(*[stands] * 3, *[goes] * 3, *[stands] * 3, *[free] * 3))
+    came_back = waits(*[stands] * 3, *[free] * 2, stands, *[free] * 12)
+    assert came_back == [False] * 6 + [True] * 9 + [False] * 3
+    # After five seconds it is something new.
+    assert not any(waits(stands, *[free] * 50, stands, *[free] * 3))
