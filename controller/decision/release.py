@@ -21,7 +21,7 @@ _GONE_S = 1.0
 
 
 class StartDelay:
-    """Keeps a standing robot standing for _GONE_S after something that comes and goes stood in its way."""
+    """Keeps the target at zero for _GONE_S after something that comes and goes stood in the way."""
 
     def __init__(self) -> None:
         self._stood_ns: int | None = None
