@@ -156,11 +156,13 @@ class Detector:
             store.ends_px.reshape(-1, 2),
             expected_px(store, velocity, prior.motion, dt_s, frame.intrinsics),
             store.pixel_cov.reshape(-1, 3),
+            store.error_px.reshape(-1),
             config.fragments,
         )
         found = flow.found.reshape(-1, 2)
         both = found[:, 0] & found[:, 1]
         store.ends_px = flow.pixels.reshape(-1, 2, 2)
+        store.error_px = flow.error_px.reshape(-1, 2)
         store.keep(both)
         surface = surface_depth(
             frame.depth,

@@ -1,4 +1,10 @@
-"""Tracking of the end points into the next image: pyramidal Lucas-Kanade with a forward-backward check."""
+"""Tracking of the end points into the next image: pyramidal Lucas-Kanade with a forward-backward check.
+
+Most ends are where they are expected, to a fraction of a pixel, but for an error that all of them have in
+common: a camera rotation that the odometry does not include. So only scouts are searched coarse to fine: the
+ends whose expectation was wrong in the frame before, new ones, and a few of the others. The median error of
+the scouts is the common one; the others are then searched in the finest level alone.
+"""
 
 from __future__ import annotations
 
@@ -9,12 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import FragmentSettings
-from hal.compiled import compiled
+from hal.compiled import compiled, inlined
 from vision.fragments import lucas_kanade
 from vision.fragments.edges import GreyImage
 
 _EXPECTATION_PX = 2.0  # sigma of an expected position, after the median error of all ends has been removed
 _RIM_PX = 2  # of the image border: an end this close is about to leave the image
+_RELIABLE_PX = 1.0  # maximum error of an expectation with which the finest level alone finds the end
+# At most every eighth end is a scout, however reliable its expectation; with few ends more of them, so that
+# their median is one of sixteen.
+_SCOUT_EVERY, _SAMPLE = 8, 16
 
 # An image, then the same at half the size, at a quarter, and so on.
 Pyramid = tuple[GreyImage, ...]
@@ -24,11 +34,13 @@ Pyramid = tuple[GreyImage, ...]
 class Flow:
     """Where N points are in the new image.
 
-    pixels (N, 2). found (N,): tracked, confirmed by the way back, and inside the image.
+    pixels (N, 2). found (N,): tracked, confirmed by the way back, and inside the image. error_px (N,): of the
+    expectation, in u or in v, whichever is larger.
     """
 
     pixels: NDArray[np.float32]
     found: NDArray[np.bool_]
+    error_px: NDArray[np.float32]
 
 
 def pyramid(grey: GreyImage, settings: FragmentSettings) -> Pyramid:
@@ -47,23 +59,31 @@ def track(
     pixels: NDArray[np.float32],
     guess: NDArray[np.float32],
     covariance: NDArray[np.float32],
+    last_error_px: NDArray[np.float32],
     settings: FragmentSettings,
 ) -> Flow:
     """Where pixels (N, 2) of the image before are now, searched from guess (N, 2).
 
     covariance (N, 3): xx, xy, yy of one flow step. An end may slide along its edge both forward and backward;
     across the edge it has to return. Therefore the forward-backward error is measured in these sigmas.
+    last_error_px (N,): error_px of the frame before, inf for a new end.
 
     The backward search starts where the guess predicts the origin of the point, not at its true origin: a
     search that starts at its goal proves nothing.
     """
     if len(pixels) == 0:
-        return Flow(np.empty((0, 2), np.float32), np.empty(0, np.bool_))
-    there, there_ok = _search(before, now, pixels, guess, settings.lk_window_px)
-    expected, back_guess = _expected(there, guess, pixels)
-    back, back_ok = _search(now[:2], before[:2], there, back_guess, settings.lk_window_px)
+        return Flow(np.empty((0, 2), np.float32), np.empty(0, np.bool_), np.empty(0, np.float32))
+    side = settings.lk_window_px
+    every = min(max(len(pixels) // _SAMPLE, 1), _SCOUT_EVERY)
+    scouts = last_error_px > _RELIABLE_PX
+    scouts[::every] = True
+    start = _by_common_error(_coarse(before, now, pixels, guess, scouts, side), guess, scouts, every)
+    there, there_ok = lucas_kanade.search(before[0], now[0], pixels, start, 1.0, side)
+    expected, back_guess, doubtful = _expected(there, guess, pixels)
+    back_start = _coarse(now[:2], before[:2], there, back_guess, doubtful, side)
+    back, back_ok = lucas_kanade.search(now[0], before[0], there, back_start, 1.0, side)
     height, width = now[0].shape
-    end, returned = _confirmed(
+    end, error_px, returned = _confirmed(
         there,
         expected,
         back - pixels,
@@ -73,45 +93,72 @@ def track(
         height,
         width,
     )
-    return Flow(end, there_ok & back_ok & returned)
+    return Flow(end, there_ok & back_ok & returned, error_px)
 
 
-def _search(
+def _coarse(
     before: Pyramid,
     now: Pyramid,
     pixels: NDArray[np.float32],
     guess: NDArray[np.float32],
-    window_px: int,
-) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Search for pixels (N, 2) from guess (N, 2), coarse to fine; positions (N, 2) and whether found (N,)."""
-    there, found = guess * np.float32(0.5 ** len(now)), np.zeros(len(guess), np.bool_)
-    for level in reversed(range(len(now))):
-        there, found = lucas_kanade.search(
-            before[level], now[level], pixels, 2.0 * there, 0.5**level, window_px
-        )
-    return there, found
+    chosen: NDArray[np.bool_],
+    side: int,
+) -> NDArray[np.float32]:
+    """guess (N, 2); those that are chosen (N,) as found in all levels but the finest. pixels: (N, 2)."""
+    which = chosen.nonzero()[0]
+    if len(which) == 0:
+        return guess
+    points, there = pixels.take(which, axis=0), guess.take(which, axis=0) * np.float32(0.5 ** len(now))
+    for level in range(len(now) - 1, 0, -1):
+        there, _ = lucas_kanade.search(before[level], now[level], points, 2.0 * there, 0.5**level, side)
+    result = guess.copy()
+    result[which] = 2.0 * there
+    return result
+
+
+@inlined
+def _median(values: NDArray[np.float32]) -> np.float32:
+    """The median of values (N,)."""
+    ordered, middle = np.sort(values), len(values) // 2
+    upper: np.float32 = ordered[middle]
+    return upper if len(values) % 2 == 1 else np.float32(0.5) * (ordered[middle - 1] + upper)
+
+
+@compiled("float32[:, ::1], float32[:, ::1], bool_[::1], int64")
+def _by_common_error(
+    found: NDArray[np.float32], guess: NDArray[np.float32], scouts: NDArray[np.bool_], every: int
+) -> NDArray[np.float32]:
+    """Where the finest search starts, (N, 2): found for scouts (N,), else guess with the common error.
+
+    found, guess (N, 2). every: how many ends there are for each that the common error is taken from.
+    """
+    start = found.copy()
+    for axis in range(2):
+        error = _median(found[::every, axis] - guess[::every, axis])
+        for n in range(len(guess)):
+            if not scouts[n]:
+                start[n, axis] = guess[n, axis] + error
+    return start
 
 
 @compiled("float32[:, ::1], float32[:, ::1], float32[:, ::1]")
 def _expected(
     there: NDArray[np.float32], guess: NDArray[np.float32], pixels: NDArray[np.float32]
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_]]:
     """Where pixels (N, 2) are expected, (N, 2), and from where they are searched on the way back, (N, 2).
 
-    The median difference between what was found there and guess is an error common to all guesses: a camera
-    rotation that they do not include.
+    The median difference between what was found there and guess is the error common to all guesses. Also
+    returns (N,) whether an end was found farther than _RELIABLE_PX from where it is expected.
     """
     expected, back_guess = np.empty_like(guess), np.empty_like(guess)
-    middle, even = len(guess) // 2, len(guess) % 2 == 0
+    doubtful = np.zeros(len(guess), np.bool_)
     for axis in range(2):
-        ordered = np.sort(there[:, axis] - guess[:, axis])
-        error = ordered[middle]
-        if even:
-            error = np.float32(0.5) * (ordered[middle - 1] + error)
+        error = _median(there[:, axis] - guess[:, axis])
         for n in range(len(guess)):
             expected[n, axis] = guess[n, axis] + error
             back_guess[n, axis] = there[n, axis] - (expected[n, axis] - pixels[n, axis])
-    return expected, back_guess
+            doubtful[n] |= abs(there[n, axis] - expected[n, axis]) > np.float32(_RELIABLE_PX)
+    return expected, back_guess, doubtful
 
 
 @compiled("float32[:, ::1], float32[:, ::1]")
@@ -137,14 +184,15 @@ def _confirmed(
     most_px: float,
     height: int,
     width: int,
-) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Fuse found and expected positions, and check the ends; positions (N, 2) and whether confirmed (N,).
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_]]:
+    """Fuse found and expected positions, and check the ends: the fields of Flow.
 
     Along a straight edge the search ends anywhere; across it, it ends on the edge. So the found position
     there, with covariance (N, 3), is fused with the expected one, with a sigma of _EXPECTATION_PX. An end is
     confirmed if the forward-backward error miss (N, 2) is small and it is inside the image.
     """
-    end, good = np.empty_like(there), np.empty(len(there), np.bool_)
+    end, error_px = np.empty_like(there), np.empty(len(there), np.float32)
+    good = np.empty(len(there), np.bool_)
     prior = np.float32(_EXPECTATION_PX**2)
     squared = mahalanobis(miss, covariance)
     for n in range(len(there)):
@@ -154,7 +202,8 @@ def _confirmed(
         u = expected[n, 0] + scale * (yy * a - xy * b)
         v = expected[n, 1] + scale * (xx * b - xy * a)
         end[n, 0], end[n, 1] = u, v
+        error_px[n] = max(abs(u - expected[n, 0]), abs(v - expected[n, 1]))
         inside = u >= _RIM_PX and u <= width - 1 - _RIM_PX and v >= _RIM_PX and v <= height - 1 - _RIM_PX
         near = abs(miss[n, 0]) <= most_px and abs(miss[n, 1]) <= most_px
         good[n] = inside and near and squared[n] <= np.float32(most_sigmas**2)
-    return end, good
+    return end, error_px, good

@@ -46,6 +46,7 @@ class FragmentStore:
     depth_m: depth of the near surface averaged over depth_samples frames, as for a static point, (N, 2).
     age_frames: frames since it was found, (N,).
     pixel_cov: xx, xy, yy of one flow step at each end, px^2, (N, 2, 3).
+    error_px: of where each end was expected in this frame (optical_flow.py); inf for new ones, (N, 2).
     body_only: found on a body that may move (vision/fragments/attention.py), so not used for the camera's
         motion, (N,).
 
@@ -67,6 +68,7 @@ class FragmentStore:
         self.depth_samples = np.empty((0, 2), np.float32)
         self.age_frames = np.empty(0, np.intp)
         self.pixel_cov = np.empty((0, 2, 3), np.float32)
+        self.error_px = np.empty((0, 2), np.float32)
         self.body_only = np.empty(0, np.bool_)
         # [frame, place, end]: direction (3), depth, far depth, depth_samples.
         self._history = np.full((HISTORY, _FEWEST_PLACES, 2, 6), np.nan)
@@ -92,6 +94,7 @@ class FragmentStore:
         self.depth_samples = self.depth_samples.take(kept, axis=0)
         self.age_frames = self.age_frames.take(kept)
         self.pixel_cov = self.pixel_cov.take(kept, axis=0)
+        self.error_px = self.error_px.take(kept, axis=0)
         self.body_only = self.body_only.take(kept)
         self._place = self._place.take(kept)
 
@@ -116,6 +119,7 @@ class FragmentStore:
         self.depth_samples = np.concatenate((self.depth_samples, np.ones((count, 2), np.float32)))
         self.age_frames = np.concatenate((self.age_frames, np.zeros(count, np.intp)))
         self.pixel_cov = np.concatenate((self.pixel_cov, pixel_cov))
+        self.error_px = np.concatenate((self.error_px, np.full((count, 2), np.inf, np.float32)))
         self.body_only = np.concatenate((self.body_only, np.full(count, body_only)))
         self._place = np.concatenate((self._place, self._free_places(count)))
 
@@ -149,8 +153,12 @@ class FragmentStore:
         self.age_frames += 1
 
     def break_history(self) -> None:
-        """Do not look back beyond the frame that is committed next: the motion to it is not known."""
+        """Do not look back beyond the frame that is committed next: the motion to it is not known.
+
+        So it is not known either how far the ends are from where they should be expected.
+        """
         self._comparable = 0
+        self.error_px = np.full_like(self.error_px, np.inf)
 
     def anchors(self, now_ns: int, window_s: float) -> AnchorEnds:
         """The oldest entry of each fragment that is at most window_s old, but no newer than the last frame.

@@ -13,7 +13,7 @@ from vision.fragments.edges import GreyImage
 
 SETTINGS = FragmentSettings()
 LEVELS = 1 + SETTINGS.lk_levels
-BOTH_WAYS = LEVELS + 2
+BOTH_WAYS = LEVELS + 1  # all ends are where they are expected: the way back is the finest level alone
 
 
 def image() -> GreyImage:
@@ -24,7 +24,8 @@ def image() -> GreyImage:
 def track(pixels: NDArray[np.float32]) -> optical_flow.Flow:
     images = optical_flow.pyramid(image(), SETTINGS)
     steady = np.tile(np.array([0.04, 0.0, 0.04], np.float32), (len(pixels), 1))
-    return optical_flow.track(images, images, pixels, pixels + np.float32(0.3), steady, SETTINGS)
+    new = np.full(len(pixels), np.inf, np.float32)
+    return optical_flow.track(images, images, pixels, pixels + np.float32(0.3), steady, new, SETTINGS)
 
 
 def test_every_search_is_recorded_as_the_call_that_finds_the_same() -> None:

@@ -38,6 +38,11 @@ def steady(count: int) -> NDArray[np.float32]:
     return np.tile(np.array([0.04, 0.0, 0.04], np.float32), (count, 1))
 
 
+def new(count: int) -> NDArray[np.float32]:
+    """The last error of ends that were never expected anywhere."""
+    return np.full(count, np.inf, np.float32)
+
+
 def track(
     before: GreyImage,
     now: GreyImage,
@@ -45,9 +50,11 @@ def track(
     guess: NDArray[np.float32],
     covariance: NDArray[np.float32],
     settings: FragmentSettings,
+    last_error_px: NDArray[np.float32] | None = None,
 ) -> Flow:
     images = pyramid(before, settings), pyramid(now, settings)
-    return track_in(*images, pixels, guess, covariance, settings)
+    last = new(len(pixels)) if last_error_px is None else last_error_px
+    return track_in(*images, pixels, guess, covariance, last, settings)
 
 
 @pytest.mark.parametrize("shift", [(0.0, 0.0), (0.4, -0.3), (3.3, -1.7), (9.5, 6.25)])
@@ -58,6 +65,43 @@ def test_a_known_shift_is_recovered_to_a_tenth_of_a_pixel(shift: tuple[float, fl
     np.testing.assert_allclose(
         (flow.pixels - start)[flow.found], np.tile(shift, (flow.found.sum(), 1)), atol=0.1
     )
+
+
+@pytest.mark.parametrize("shift", [(3.3, -1.7), (9.5, 6.25)])
+def test_a_shift_of_the_whole_image_is_found_where_expectations_were_right_so_far(
+    shift: tuple[float, float],
+) -> None:
+    before, start = pattern(1), points()
+    right = np.zeros(len(start), np.float32)
+    flow = track(before, shifted(before, *shift), start, start, steady(len(start)), SETTINGS, right)
+    assert flow.found.mean() >= 0.95
+    np.testing.assert_allclose(
+        (flow.pixels - start)[flow.found], np.tile(shift, (flow.found.sum(), 1)), atol=0.1
+    )
+    # It is common to all ends, so it is not an error of any of them.
+    assert (flow.error_px[flow.found] < 0.2).all()
+
+
+@pytest.mark.parametrize("left_out", [1, 7, 13])
+def test_what_moves_by_itself_is_found_coarse_to_fine_if_its_expectation_was_wrong(left_out: int) -> None:
+    before, start = pattern(1), points()
+    guess, last = start.copy(), np.zeros(len(start), np.float32)
+    guess[left_out] -= (9.5, 0.0)
+    for error_px, found in ((0.0, False), (0.9, False), (1.1, True), (np.inf, True)):
+        last[left_out] = error_px
+        flow = track(before, before, start, guess, steady(len(start)), SETTINGS, last)
+        there = flow.found[left_out] and np.abs(flow.pixels[left_out] - start[left_out]).max() < 0.2
+        assert there == found, error_px
+        assert np.delete(flow.found, left_out).all()
+    assert flow.error_px[left_out] == pytest.approx(9.5, abs=0.3)
+
+
+def test_with_few_points_all_are_searched_coarse_to_fine() -> None:
+    before, start = pattern(1), points()[:4]
+    right = np.zeros(len(start), np.float32)
+    guess = start + np.array([[9.5, 0.0], [0.0, 9.5], [-9.5, 0.0], [0.0, -9.5]], np.float32)
+    flow = track(before, before, start, guess, steady(len(start)), SETTINGS, right)
+    np.testing.assert_allclose(flow.pixels, start, atol=0.5)
 
 
 def test_a_good_guess_reaches_farther_than_the_pyramid_alone() -> None:
@@ -126,7 +170,7 @@ def test_no_points() -> None:
     none = np.empty((0, 2), np.float32)
     flow = track(pattern(1), pattern(1), none, none, np.empty((0, 3), np.float32), SETTINGS)
     assert flow.pixels.shape == (0, 2)
-    assert flow.found.shape == (0,)
+    assert flow.found.shape == flow.error_px.shape == (0,)
 
 
 def test_an_end_may_slide_along_its_edge_but_not_across() -> None:
@@ -156,7 +200,7 @@ def test_what_comes_back_inside_of_the_image_is_confirmed(
 ) -> None:
     there, off = np.array([place], np.float32), np.array([miss], np.float32)
     covariance = np.array([[4.0, 0.0, 0.25]], np.float32)
-    end, confirmed = _confirmed(there, there, off, covariance, 3.0, 4.0, 60, 100)
+    end, _, confirmed = _confirmed(there, there, off, covariance, 3.0, 4.0, 60, 100)
     np.testing.assert_array_equal(end, there)
     assert confirmed.tolist() == [good]
 
@@ -165,5 +209,6 @@ def test_along_its_edge_an_end_is_where_it_is_expected_and_across_where_it_is_fo
     """Variances 12 and 0 px^2 of the search against 4 of the expectation: a quarter and all of the way."""
     there, expected = np.array([[38.0, 38.0]], np.float32), np.array([[30.0, 30.0]], np.float32)
     covariance, none = np.array([[12.0, 0.0, 0.0]], np.float32), np.zeros((1, 2), np.float32)
-    end, _ = _confirmed(there, expected, none, covariance, 3.0, 4.0, 60, 100)
+    end, error_px, _ = _confirmed(there, expected, none, covariance, 3.0, 4.0, 60, 100)
     np.testing.assert_allclose(end, [[32.0, 38.0]], rtol=1e-6)
+    np.testing.assert_allclose(error_px, [8.0], rtol=1e-6)

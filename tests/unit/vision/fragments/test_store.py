@@ -116,3 +116,17 @@ def test_who_is_a_witness_stays_one() -> None:
     assert store.body_only.tolist() == [False, False, True]
     store.clear()
     assert len(store.body_only) == 0
+
+
+def test_a_new_end_has_not_been_expected_anywhere_and_others_keep_their_error() -> None:
+    store = FragmentStore()
+    add(store, 2)
+    assert np.isinf(store.error_px).all()
+    store.error_px = np.array([[0.1, 0.2], [0.3, 0.4]], np.float32)
+    add(store, 1)
+    store.keep(np.array([False, True, True]))
+    np.testing.assert_allclose(store.error_px, np.array([[0.3, 0.4], [np.inf, np.inf]], np.float32))
+    store.break_history()
+    assert np.isinf(store.error_px).all()
+    store.clear()
+    assert store.error_px.shape == (0, 2)
