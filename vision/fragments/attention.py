@@ -32,7 +32,7 @@ from vision.fragments.candidates import (
 )
 from vision.fragments.corners import corners_within, in_pairs
 from vision.fragments.edges import GreyImage, find_edges
-from vision.fragments.segments import find_segments, longest_first
+from vision.fragments.segments import SNAP_PX, find_segments, longest_first
 
 _FEW_FRAGMENTS = 4  # fewer are too few: a verdict along the line of sight takes 8 ends (bodies/proof.py)
 _ENOUGH_OF_A_MOVER = 2  # enough to follow a mover, together with its surface
@@ -216,7 +216,8 @@ class Attention:
         settings = self._config.fragments
         edges = find_edges(body.grey, _CONTRAST)
         segments_px = find_segments(edges, _MIN_LENGTH * settings.min_length_px, body.corner_px)
-        return self._on_it(frame, grey, longest_first(segments_px)[:_CANDIDATES], ends_px, body, wanted)
+        longest_px = longest_first(segments_px)[:_CANDIDATES]
+        return self._on_it(frame, grey, longest_px, SNAP_PX, ends_px, body, wanted)
 
     def _by_corners(
         self, frame: RgbdFrame, grey: GreyImage, ends_px: NDArray[np.float32], body: _Body, wanted: int
@@ -235,19 +236,26 @@ class Attention:
             frame.depth, scale_m, points, config.min_depth_m, config.max_depth_m, config.depth_noise
         )
         usable = _alone_on_it(surface.near_m, surface.far_m, surface.holes, body)
-        return self._on_it(frame, grey, in_pairs(points[usable]), ends_px, body, wanted)
+        # Moved, they would end up on the outline: its corners are the stronger ones, and were left out.
+        return self._on_it(frame, grey, in_pairs(points[usable]), 0, ends_px, body, wanted)
 
     def _on_it(
         self,
         frame: RgbdFrame,
         grey: GreyImage,
         segments_px: NDArray[np.float32],
+        reach_px: int,
         ends_px: NDArray[np.float32],
         body: _Body,
         wanted: int,
     ) -> NewFragments:
-        """At most wanted fragments, of segments (N, 2, 2) that lie on a body and can be tracked."""
-        ends, tensor = trackable_segments(grey, segments_px, ends_px, _MIN_END_DISTANCE_PX, _MIN_EIGENVALUE)
+        """At most wanted fragments, of segments (N, 2, 2) that lie on a body and can be tracked.
+
+        reach_px: maximum distance by which an end is moved to a corner.
+        """
+        ends, tensor = trackable_segments(
+            grey, segments_px, ends_px, _MIN_END_DISTANCE_PX, _MIN_EIGENVALUE, reach_px
+        )
         surface = depth_along(ends, frame, self._config)
         at_ends = surface.near_m[:, ::4], surface.far_m[:, ::4], surface.holes[:, ::4]
         here = on_one_surface(surface.near_m, self._config) & _alone_on_it(*at_ends, body).all(axis=1)

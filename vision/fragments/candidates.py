@@ -16,7 +16,7 @@ from hal.types import FloatArray, RgbdFrame
 from vision.depth.depth_mask import SurfaceDepth, surface_depth
 from vision.depth.depth_noise import depth_sigma_of
 from vision.fragments.edges import GreyImage
-from vision.fragments.segments import snap_to_corners
+from vision.fragments.segments import SNAP_PX, snap_to_corners
 
 _TAKEN_PX = 6  # size of a place: about half a search window, since closer ends would track the same pixels
 # Image noise of 3 grey levels adds this to both eigenvalues of the structure tensor over 7x7 px.
@@ -67,15 +67,16 @@ def trackable_segments(
     ends_px: NDArray[np.float32],
     min_distance_px: float,
     min_eigenvalue: float = 0.0,
+    reach_px: int = SNAP_PX,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """The trackable segments among segments_px (N, 2, 2), with their ends moved to corners.
+    """The trackable segments among segments_px (N, 2, 2), with their ends moved to corners within reach_px.
 
     A segment is kept if its ends are at least min_distance_px apart, if no present fragment, ends_px
     (K, 2, 2), and no better segment has an end in the same place, and if the smaller eigenvalue of the
     structure tensor is at least min_eigenvalue at both ends. Returns the segments (M, 2, 2), those with the
     largest such eigenvalue first, and the structure tensor at their ends (M, 2, 3).
     """
-    snapped, tensor = snap_to_corners(grey, segments_px)
+    snapped, tensor = snap_to_corners(grey, segments_px, reach_px)
     height, width = grey.shape
     present = np.ascontiguousarray(ends_px)
     return _best_trackable(snapped, tensor, present, height, width, min_distance_px, min_eigenvalue)

@@ -19,11 +19,11 @@ from vision.fragments.edges import GreyImage
 
 Reals = TypeVar("Reals", np.float32, NDArray[np.float32])
 
-_SNAP_PX = 4  # maximum distance that an end is moved: edges end somewhat before a corner
+SNAP_PX = 4  # maximum distance that an end is moved: edges end somewhat before a corner
 _WINDOW_PX = 3  # half window of the structure tensor: 7x7, less than the 11x11 of optical flow
-_REACH_PX = _SNAP_PX + _WINDOW_PX
+_REACH_PX = SNAP_PX + _WINDOW_PX
 _MARGIN_PX = _REACH_PX + 2  # one for the gradient, one for the padding of a row
-_SIDE, _WINDOW, _ROWS = 2 * _SNAP_PX + 1, 2 * _WINDOW_PX + 1, 2 * _REACH_PX + 1
+_SIDE, _WINDOW, _ROWS = 2 * SNAP_PX + 1, 2 * _WINDOW_PX + 1, 2 * _REACH_PX + 1
 _ROW = _ROWS + 1  # values stored per row: padded to 16, which the processor handles at a time
 # Angular step of the Hough transform. A segment of 32 px turns by somewhat more than this when an end moves
 # by one pixel, so a finer step gains nothing. Vertical, horizontal and diagonal lines are among the steps.
@@ -54,16 +54,16 @@ def hough_segments(edges: GreyImage, min_length_px: float) -> NDArray[np.float32
 
 
 def snap_to_corners(
-    grey: GreyImage, ends_px: NDArray[np.float32]
+    grey: GreyImage, ends_px: NDArray[np.float32], reach_px: int
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """The ends (N, 2, 2), each moved to the most corner-like pixel within 4 px in u and v.
+    """The ends (N, 2, 2), each moved to the most corner-like pixel within reach_px <= SNAP_PX in u and v.
 
     Also returns the structure tensor there (N, 2, 3): uu, uv, vv of the grey level's gradient, summed over
     7x7 px. Most corner-like is the pixel with the largest smaller eigenvalue of this tensor (Shi and Tomasi).
     """
     if len(ends_px) > 0 and min(grey.shape) < 2 * _MARGIN_PX + 1:
         raise ValueError(f"no end has its surroundings in an image of {grey.shape[1]}x{grey.shape[0]} pixels")
-    return _snapped(np.ascontiguousarray(grey), np.ascontiguousarray(ends_px))
+    return _snapped(np.ascontiguousarray(grey), np.ascontiguousarray(ends_px), reach_px)
 
 
 @inlined
@@ -110,25 +110,30 @@ def _sums(values: NDArray[np.int32], over_rows: NDArray[np.int32], into: NDArray
 
 @inlined
 def _most_corner_like(
-    uu: NDArray[np.float32], uv: NDArray[np.float32], vv: NDArray[np.float32], held: NDArray[np.float32]
+    uu: NDArray[np.float32],
+    uv: NDArray[np.float32],
+    vv: NDArray[np.float32],
+    held: NDArray[np.float32],
+    reach_px: int,
 ) -> int:
-    """Index of the largest smaller eigenvalue, the first of equal ones.
+    """Index of the largest smaller eigenvalue within reach_px of the middle, the first of equal ones.
 
     All arrays are (9 * 16,), of which the first nine values of a row are valid. held: work space.
     """
     for place in range(_SIDE * _ROW):
         held[place] = smaller_eigenvalue(uu[place], uv[place], vv[place])
-    best = 0
-    for i in range(_SIDE):
-        for place in range(i * _ROW, i * _ROW + _SIDE):
+    first, last = SNAP_PX - reach_px, SNAP_PX + reach_px
+    best = first * _ROW + first
+    for i in range(first, last + 1):
+        for place in range(i * _ROW + first, i * _ROW + last + 1):
             if held[place] > held[best]:
                 best = place
     return best
 
 
-@compiled("uint8[:, ::1], float32[:, :, ::1]")
+@compiled("uint8[:, ::1], float32[:, :, ::1], int64")
 def _snapped(
-    grey: GreyImage, ends_px: NDArray[np.float32]
+    grey: GreyImage, ends_px: NDArray[np.float32], reach_px: int
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """As snap_to_corners."""
     height, width = grey.shape
@@ -143,9 +148,9 @@ def _snapped(
             _gradient_products(grey, u, v, products[0], products[1], products[2])
             for k in range(3):
                 _sums(products[k], over_rows, tensor[k])
-            best = _most_corner_like(tensor[0], tensor[1], tensor[2], held)
-            snapped[segment, end, 0] = u - _SNAP_PX + best % _ROW
-            snapped[segment, end, 1] = v - _SNAP_PX + best // _ROW
+            best = _most_corner_like(tensor[0], tensor[1], tensor[2], held, reach_px)
+            snapped[segment, end, 0] = u - SNAP_PX + best % _ROW
+            snapped[segment, end, 1] = v - SNAP_PX + best // _ROW
             for k in range(3):
                 at_best[segment, end, k] = tensor[k, best]
     return snapped, at_best

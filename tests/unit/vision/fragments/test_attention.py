@@ -259,3 +259,16 @@ def test_a_body_without_straight_edges_gets_fragments_between_its_corners(frame:
     lower = found.ends_px[:, 1, 1] > found.ends_px[:, 0, 1]
     assert lower.all()
     np.testing.assert_allclose(found.near_m, FRONT_M, atol=0.2)
+
+
+def test_corners_close_to_the_outline_are_not_moved_onto_it(frame: RgbdFrame) -> None:
+    """The outline is a stronger corner everywhere, but it belongs to the background as well."""
+    dotted = frame.colour.copy()
+    dotted[178:316, 281:358] = 90
+    marks = np.array([(287, 200), (288, 215), (287, 240), (288, 265)])
+    for u, v in marks.tolist():
+        dotted[v - 1 : v + 2, u - 1 : u + 2] = 150
+    shown = replace(frame, colour=dotted)
+    found = awake(shown).find(shown, grey_of(shown), NO_ENDS, one_body())
+    assert len(found.ends_px) == 2
+    np.testing.assert_allclose(found.ends_px.reshape(-1, 2), marks, atol=2.0)

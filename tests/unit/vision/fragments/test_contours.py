@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from vision.fragments.contours import find_contours
 from vision.fragments.edges import find_edges
 from vision.fragments.segments import (
+    SNAP_PX,
     find_segments,
     hough_segments,
     lengths_px,
@@ -136,12 +137,12 @@ def test_ends_are_moved_to_the_corner_nearby() -> None:
     grey = empty()
     grey[60:140, 80:200] = 180
     # The upper edge of the block, its ends found 3 px away from its corners.
-    snapped, tensor = snap_to_corners(grey, np.array([[[83.0, 60.0], [196.0, 61.0]]], np.float32))
+    snapped, tensor = snap_to_corners(grey, np.array([[[83.0, 60.0], [196.0, 61.0]]], np.float32), SNAP_PX)
     # Anywhere within 3 px of the corner the 7x7 px around hold both edges.
     np.testing.assert_allclose(snapped, [[[79.5, 59.5], [199.5, 59.5]]], atol=3.0)
     # Both directions are held there, unlike in the middle of the edge.
     held = smaller_eigenvalue(*np.moveaxis(tensor, -1, 0))
-    _, along = snap_to_corners(grey, np.array([[[140.0, 60.0], [140.0, 139.0]]], np.float32))
+    _, along = snap_to_corners(grey, np.array([[[140.0, 60.0], [140.0, 139.0]]], np.float32), SNAP_PX)
     assert held.min() > 1000.0
     assert smaller_eigenvalue(*np.moveaxis(along, -1, 0)).max() == pytest.approx(0.0, abs=1e-2)
 
@@ -155,33 +156,35 @@ def tensor_at(grey: NDArray[np.uint8], u: int, v: int) -> tuple[float, float, fl
 
 @pytest.mark.parametrize("end_px", [(0.0, 0.0), (39.0, 29.0), (17.4, 12.6), (9.0, 20.0), (30.0, 9.0)])
 @pytest.mark.parametrize("levels", [2, 256])
+@pytest.mark.parametrize("reach_px", [0, 1, SNAP_PX])
 def test_an_end_goes_where_it_is_held_best_and_of_equal_places_to_the_first(
-    end_px: tuple[float, float], levels: int
+    end_px: tuple[float, float], levels: int, reach_px: int
 ) -> None:
     """9 px from the border of the image the surroundings of all places end."""
     grey = np.random.default_rng(3).integers(0, levels, (30, 40), dtype=np.uint8)
     middle_u, middle_v = (min(max(round(x), 9), size - 10) for x, size in zip(end_px, (40, 30), strict=True))
-    around = [(middle_u + right, middle_v + down) for down in range(-4, 5) for right in range(-4, 5)]
+    steps = range(-reach_px, reach_px + 1)
+    around = [(middle_u + right, middle_v + down) for down in steps for right in steps]
     tensors = np.array([tensor_at(grey, u, v) for u, v in around], np.float32)
     best = int(smaller_eigenvalue(*tensors.T.copy()).argmax())
-    snapped, tensor = snap_to_corners(grey, np.array([[end_px, end_px]], np.float32))
+    snapped, tensor = snap_to_corners(grey, np.array([[end_px, end_px]], np.float32), reach_px)
     np.testing.assert_array_equal(snapped, [[around[best]] * 2])
     np.testing.assert_array_equal(tensor, [[tensors[best]] * 2])
 
 
 def test_in_an_image_too_small_for_any_surroundings_there_are_no_ends() -> None:
     grey = np.zeros((18, 40), np.uint8)
-    snapped, tensor = snap_to_corners(grey, np.empty((0, 2, 2), np.float32))
+    snapped, tensor = snap_to_corners(grey, np.empty((0, 2, 2), np.float32), SNAP_PX)
     assert snapped.shape == (0, 2, 2)
     assert tensor.shape == (0, 2, 3)
     with pytest.raises(ValueError, match="40x18"):
-        snap_to_corners(grey, np.ones((1, 2, 2), np.float32))
+        snap_to_corners(grey, np.ones((1, 2, 2), np.float32), SNAP_PX)
 
 
 def test_ends_at_the_rim_of_the_image_stay_inside() -> None:
     rng = np.random.default_rng(3)
     grey = rng.integers(0, 255, (200, 300), dtype=np.uint8)
-    snapped, _ = snap_to_corners(grey, np.array([[[0.0, 0.0], [299.0, 199.0]]], np.float32))
+    snapped, _ = snap_to_corners(grey, np.array([[[0.0, 0.0], [299.0, 199.0]]], np.float32), SNAP_PX)
     assert (snapped >= 0).all()
     assert (snapped[..., 0] < 300).all()
     assert (snapped[..., 1] < 200).all()
