@@ -14,6 +14,9 @@ from hal.records import record
 from hal.types import CameraMount, FloatArray, PlanarPose
 from vision.scene import FreeSpace
 
+# x_m and y_m of the camera on the floor, and the cosine and sine of where it looks.
+Eye = tuple[float, float, float, float]
+
 # A point this near to an obstacle's box is part of it: swinging limbs, a box that lags a little.
 AROUND_M = 0.3
 _DEPTH_SIGMAS = 3.5
@@ -85,7 +88,7 @@ def surfaces_of(
 ) -> Surfaces:
     """The surfaces of free, seen by the camera of a robot at pose. noise: of its depth."""
     seen_m, bands, forward, half_band_m, points = _surfaces(
-        free.bearing_tan, free.half_width_tan, free.nearest_m, free.known_m, *_eye(pose, mount)
+        free.bearing_tan, free.half_width_tan, free.nearest_m, free.known_m, _eye(pose, mount)
     )
     return Surfaces(seen_m, bands, forward, half_band_m, points, noise)
 
@@ -112,7 +115,7 @@ def bands_at(
         y_m.reshape(-1),
         free.bearing_tan[0] - free.half_width_tan,
         2.0 * free.half_width_tan,
-        *_eye(pose, mount),
+        _eye(pose, mount),
     )
     return forward.reshape(x_m.shape), band.reshape(x_m.shape)
 
@@ -140,12 +143,12 @@ def seen_of(
         least_m,
         free.bearing_tan[0] - free.half_width_tan,
         2.0 * free.half_width_tan,
-        *_eye(pose, mount),
+        _eye(pose, mount),
     )
 
 
-def _eye(pose: PlanarPose, mount: CameraMount) -> tuple[float, float, float, float]:
-    """x_m and y_m of the camera on the floor, and the cosine and sine of where it looks."""
+def _eye(pose: PlanarPose, mount: CameraMount) -> Eye:
+    """The camera of a robot at pose."""
     cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
     return (
         pose.x_m + mount.forward_m * cos - mount.left_m * sin,
@@ -193,18 +196,16 @@ def _reach_m(forward_m: FloatArray, off_per_m: float) -> FloatArray:
     return AROUND_M + off_per_m * forward_m * forward_m
 
 
-@compiled("float64[:], float64, float64[:], float64[:], float64, float64, float64, float64")
+@compiled("float64[:], float64, float64[:], float64[:], UniTuple(float64, 4)")
 def _surfaces(
     bearing_tan: FloatArray,
     half_width_tan: float,
     nearest_m: FloatArray,
     known_m: FloatArray,
-    eye_x: float,
-    eye_y: float,
-    cos: float,
-    sin: float,
+    eye: Eye,
 ) -> tuple[FloatArray, NDArray[np.intp], FloatArray, FloatArray, FloatArray]:
-    """The fields of Surfaces, for a camera at eye_x, eye_y that looks along cos, sin."""
+    """The fields of Surfaces, for a camera at eye."""
+    eye_x, eye_y, cos, sin = eye
     count, found = len(bearing_tan), 0
     seen, bands, forward = np.empty(count), np.empty(count, np.intp), np.empty(count)
     half_band, points = np.empty(count), np.empty((count, 2))
@@ -229,39 +230,34 @@ def _band_at(
     y_m: float,
     first_tan: float,
     width_tan: float,
-    eye_x: float,
-    eye_y: float,
-    cos: float,
-    sin: float,
+    eye: Eye,
 ) -> tuple[float, int]:
     """As bands_at, for one point; the first band begins at first_tan, each is width_tan wide."""
+    eye_x, eye_y, cos, sin = eye
     dx, dy = x_m - eye_x, y_m - eye_y
     forward, right = dx * cos + dy * sin, dx * sin - dy * cos
     band = (right / max(forward, 1e-3) - first_tan) / width_tan
     return forward, math.floor(band) if math.isfinite(band) else -1
 
 
-@compiled("float64[:], float64[:], float64, float64, float64, float64, float64, float64")
+@compiled("float64[:], float64[:], float64, float64, UniTuple(float64, 4)")
 def _bands_at(
     x_m: FloatArray,
     y_m: FloatArray,
     first_tan: float,
     width_tan: float,
-    eye_x: float,
-    eye_y: float,
-    cos: float,
-    sin: float,
+    eye: Eye,
 ) -> tuple[FloatArray, NDArray[np.intp]]:
     """As bands_at, for points (P,)."""
     forward, band = np.empty(len(x_m)), np.empty(len(x_m), np.intp)
     for k in range(len(x_m)):
-        forward[k], band[k] = _band_at(x_m[k], y_m[k], first_tan, width_tan, eye_x, eye_y, cos, sin)
+        forward[k], band[k] = _band_at(x_m[k], y_m[k], first_tan, width_tan, eye)
     return forward, band
 
 
 @compiled(
     "float64[:, :, :], float64, boolean[:], float64[:], float64[:], float64,"
-    "float64, float64, float64, float64, float64, float64"
+    "float64, float64, UniTuple(float64, 4)"
 )
 def _seen_of(
     points_m: FloatArray,
@@ -272,17 +268,14 @@ def _seen_of(
     least_m: float,
     first_tan: float,
     width_tan: float,
-    eye_x: float,
-    eye_y: float,
-    cos: float,
-    sin: float,
+    eye: Eye,
 ) -> NDArray[np.int64]:
     """As seen_of; the first band begins at first_tan, each is width_tan wide."""
     seen = np.zeros(points_m.shape[1], np.int64)
     for row in range(points_m.shape[1]):
         for k in range(points_m.shape[2]):
             x_m, y_m = points_m[0, row, k], points_m[1, row, k]
-            forward, b = _band_at(x_m, y_m, first_tan, width_tan, eye_x, eye_y, cos, sin)
+            forward, b = _band_at(x_m, y_m, first_tan, width_tan, eye)
             if not (0 <= b < len(known_m) and forward > least_m):
                 continue
             reach_m = forward + before_m
