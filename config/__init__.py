@@ -6,6 +6,8 @@ app.py - the whole configuration of `treadwatch run`, `govern` and `replay`, and
 robot.py - body, limits and camera mount of the robot
 camera.py - which camera, with its settings
 chassis.py - which chassis, the link to it, and the simulated base behind an emulator
+agilex.py - models of AgileX bases, with their top speeds
+chassis_checks.py - what must fit between chassis, limits and control rate
 perception.py - detection, ego-motion and tracking
 decision.py - margins, prediction, sight and release of the decision
 path.py - the planned path: start pose, lines and arcs

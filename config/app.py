@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
 from config.camera import AnyCameraConfig, CameraConfig, ReplayCameraConfig, SimulatedCameraConfig
-from config.chassis import (
-    COMMAND_EARLY,
-    AnyChassisConfig,
-    ChassisConfig,
-    PlantConfig,
-    RoboclawChassisConfig,
-    RoboteqChassisConfig,
-)
+from config.chassis import ChassisConfig, PlantConfig
+from config.chassis_checks import check_protocol, check_top_speed, check_turns
 from config.decision import DecisionConfig
 from config.governor import GovernorConfig
 from config.loader import Section, load, read_yaml
@@ -24,15 +17,12 @@ from config.path import PathSpec
 from config.perception import PerceptionConfig
 from config.robot import Robot
 
-# What a robot with a real camera has to be told; each has a default for simulations.
+# Keys that a robot with a real camera must give; in a simulation each has a default.
 _OF_A_REAL_ROBOT = {
     "body": ("width_m", "length_m", "rear_m", "height_m"),
     "limits": ("max_speed_mps",),
     "camera_mount": ("forward_m", "height_m", "pitch_deg"),
 }
-
-# Slower, and encoders, status and voltages would grow stale between their turns.
-ROBOCLAW_RATE_HZ = 40.0
 
 
 class SimulationConfig(Section):
@@ -78,7 +68,7 @@ RunnerConfig = Annotated[LockstepRunner | RealtimeRunner, Field(discriminator="k
 
 
 def _check_speeds(robot: Robot, perception: PerceptionConfig) -> None:
-    """Who goes as fast as the decision reckons with must be believed when seen. Raises ValueError."""
+    """Perception must believe every speed that the decision allows for. Raises ValueError."""
     reckoned_mps, believed_mps = robot.limits.max_obstacle_speed_mps, perception.motion.max_speed_mps
     if believed_mps < reckoned_mps:
         raise ValueError(
@@ -88,7 +78,7 @@ def _check_speeds(robot: Robot, perception: PerceptionConfig) -> None:
 
 
 def _check_range(perception: PerceptionConfig, decision: DecisionConfig) -> None:
-    """What the speed counts on having seen must be looked at. Raises ValueError."""
+    """The speed may only rely on floor within the depth that perception looks at. Raises ValueError."""
     counted_on_m, looked_at_m = decision.sight.range_m, perception.max_depth_m
     if counted_on_m > looked_at_m:
         raise ValueError(
@@ -97,23 +87,8 @@ def _check_range(perception: PerceptionConfig, decision: DecisionConfig) -> None
         )
 
 
-def _check_watchdog(chassis: RoboteqChassisConfig, rate_hz: float) -> None:
-    """The driver says zero first after half of the watchdog: it must not come to that with every command, or
-    the robot is told to stop all the time. Raises ValueError."""
-    exchange_ms = 1000.0 / rate_hz
-    exchanges = math.ceil(COMMAND_EARLY * chassis.command_period_ms / exchange_ms - 1e-9)
-    apart_ms = exchange_ms * max(exchanges, 1)
-    if 2.0 * apart_ms >= chassis.watchdog_ms:
-        raise ValueError(
-            f"chassis.watchdog_ms ({chassis.watchdog_ms}) must be more than twice the {apart_ms:g} ms from "
-            f"one command to the next (chassis.command_period_ms {chassis.command_period_ms}, a quarter "
-            f"early at most, in whole steps of runner.control_rate_hz {rate_hz:g}): raise it, or command "
-            "more often"
-        )
-
-
 def _check_latency(runner: LockstepRunner | RealtimeRunner, decision: DecisionConfig) -> None:
-    """A scene that is too old before it is known lets nothing ever move. Raises ValueError."""
+    """If every scene is stale when it arrives, the robot never moves. Raises ValueError."""
     if isinstance(runner, LockstepRunner) and runner.perception_latency_s >= decision.sight.stale_s:
         raise ValueError(
             f"runner.perception_latency_s ({runner.perception_latency_s:g}) must be less than "
@@ -127,8 +102,10 @@ def _check_frames(
     perception: PerceptionConfig,
     decision: DecisionConfig,
 ) -> None:
-    """Frames so rare that each scene is stale before the next would have the robot brake between any two.
-    Raises ValueError. Of a recording only the recording knows."""
+    """If a scene grows stale before the next one comes, the robot brakes between any two. Raises ValueError.
+
+    A recording is not checked: its rate is not in the configuration.
+    """
     if isinstance(camera, ReplayCameraConfig):
         return
     period_s, latency_s = 1.0 / camera.fps, 0.0
@@ -146,37 +123,6 @@ def _check_frames(
         raise ValueError(
             f"camera.fps ({camera.fps:g}): frames are {period_s:.3g} s apart, more than perception.max_gap_s "
             f"({perception.max_gap_s:g}), so no two would be compared; raise either"
-        )
-
-
-def _check_turns(robot: Robot, chassis: AnyChassisConfig) -> None:
-    """A turn that the base cannot make is slowed by the driver, speed and all, in one step. Raises
-    ValueError."""
-    limits = robot.limits
-    makes_radps = chassis.top_yaw_rate_radps(limits.max_speed_mps)
-    if limits.max_yaw_rate_radps > makes_radps:
-        raise ValueError(
-            f"robot.limits.max_yaw_rate_radps ({limits.max_yaw_rate_radps:g}) is more than the base makes by "
-            f"its section chassis, {makes_radps:.4g} rad/s where it goes at robot.limits.max_speed_mps "
-            f"({limits.max_speed_mps:g}): lower the yaw rate, or the speed if that leaves too little"
-        )
-
-
-def _check_ramp(robot: Robot, chassis: RoboclawChassisConfig) -> None:
-    """A controller that brakes more softly than the stopping model does drives on where a stop was promised.
-
-    The outer track of a bend of radius R goes, and brakes, 1 + width / 2R times as hard as the middle; no
-    bend and no arc is tighter than half the body's width. Raises ValueError.
-    """
-    hardest_mps2 = robot.limits.emergency_decel_mps2
-    needed_mps2 = hardest_mps2 * (1.0 + chassis.effective_width_m / robot.body.width_m)
-    ramp_mps2 = chassis.accel_qpps2 / chassis.counts_per_m
-    if ramp_mps2 < needed_mps2:
-        raise ValueError(
-            f"chassis.accel_qpps2 ({chassis.accel_qpps2}) is a ramp of {ramp_mps2:.3g} m/s2, but to stop at "
-            f"robot.limits.emergency_decel_mps2 ({hardest_mps2:g}) the outer track of the tightest bend has "
-            f"to slow down at {needed_mps2:.3g} m/s2: the base would stop later than is reckoned with; write "
-            f"at least {math.ceil(needed_mps2 * chassis.counts_per_m)}, or lower the limit"
         )
 
 
@@ -204,11 +150,18 @@ class AppConfig(Section):
         _check_range(self.perception, self.decision)
         _check_latency(self.runner, self.decision)
         _check_frames(self.camera, self.runner, self.perception, self.decision)
-        if self.robot.limits.max_speed_mps > self.chassis.top_speed_mps:
+        check_top_speed(self.robot, self.chassis)
+        self._check_way()
+        check_turns(self.robot, self.chassis)
+        if self.runner.kind == "lockstep" and self.camera.kind != "simulated":
             raise ValueError(
-                f"robot.limits.max_speed_mps ({self.robot.limits.max_speed_mps:g}) is more than the base "
-                f"makes by its section chassis, {self.chassis.top_speed_mps:g} m/s"
+                "runner.kind 'lockstep' runs on simulated time and needs camera.kind 'simulated'"
             )
+        check_protocol(self.robot, self.chassis, self.runner.control_rate_hz)
+        return self
+
+    def _check_way(self) -> None:
+        """Exactly one of scenario, path and governor says where the robot goes. Raises ValueError."""
         simulated = self.camera.kind == "simulated"
         if simulated and self.simulation is None:
             raise ValueError("camera.kind 'simulated' needs a 'simulation' section with a scenario")
@@ -222,24 +175,9 @@ class AppConfig(Section):
             raise ValueError("a 'governor' hears commands as they come and needs runner.kind 'realtime'")
         if simulated and self.path is not None:
             raise ValueError("a simulation drives the path of its scenario: write it there, not here")
-        _check_turns(self.robot, self.chassis)
-        if self.runner.kind == "lockstep" and not simulated:
-            raise ValueError(
-                "runner.kind 'lockstep' runs on simulated time and needs camera.kind 'simulated'"
-            )
-        if self.chassis.kind == "roboclaw":
-            _check_ramp(self.robot, self.chassis)
-        if self.chassis.kind == "roboclaw" and self.runner.control_rate_hz < ROBOCLAW_RATE_HZ:
-            raise ValueError(
-                f"runner.control_rate_hz must be at least {ROBOCLAW_RATE_HZ:g} with a RoboClaw, "
-                "which answers one request an exchange"
-            )
-        if self.chassis.kind == "roboteq":
-            _check_watchdog(self.chassis, self.runner.control_rate_hz)
-        return self
 
     def _check_real_robot(self) -> None:
-        """Another robot's size, mounting or speed would be a guess. Raises ValueError."""
+        """Size, mounting and speed of a real robot have no defaults. Raises ValueError."""
         missing = []
         for section, keys in _OF_A_REAL_ROBOT.items():
             if section not in self.robot.model_fields_set:

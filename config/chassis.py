@@ -85,7 +85,7 @@ class SerialLinkConfig(Section):
         return self.url.partition("://")[0] in _NETWORK_SCHEMES
 
 
-# pyserial's ports at the other end of a network; what is wrong with such a URL, it does not tell.
+# pyserial's ports at the other end of a network. pyserial does not say what is wrong with such a URL.
 _NETWORK_SCHEMES = frozenset({"socket", "rfc2217"})
 
 
@@ -139,8 +139,11 @@ class AgilexChassisConfig(Section):
         return AGILEX_TOP_SPEED_MPS[self.model]
 
     def top_yaw_rate_radps(self, v_mps: float) -> float:
-        """How fast it turns at most, at any speed v_mps; its limit is of what it is told, slip_factor times
-        that. With more, as with more than top_speed_mps, the driver would slow the robot in one step."""
+        """Maximum yaw rate at any speed v_mps.
+
+        The base limits the commanded yaw rate, which is slip_factor times the yaw rate over ground. Above it,
+        as above top_speed_mps, the driver would slow the robot in one step.
+        """
         return AGILEX_TOP_YAW_RATE_RADPS[self.model] / self.slip_factor
 
     @model_validator(mode="after")

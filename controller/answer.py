@@ -27,10 +27,11 @@ _BREAKS_LOOSE_MPS = 0.2
 # A dip: the base receives again before it has fallen that far. Its speed drops by this much within this time,
 # although no lower speed was commanded.
 _DIPS_MPS, _DIPS_NS = 0.1, 400_000_000
-# Faster than what was commanded in the last seconds, whatever its lag: as in hal/chassis/following.py.
+# Too fast: above the greatest command of the last _LAG_NS by this share and this constant, as in
+# hal/chassis/following.py. The time covers any lag of a base.
 _LAG_NS = 6 * NS_PER_S
 _FASTEST_SHARE, _FASTEST_MPS = 1.5, 0.15
-# Faster than the robot ever may.
+# Too fast as well: above the robot's top speed by this share and this constant.
 _ABOVE_TOP_SHARE, _ABOVE_TOP_MPS = 1.1, 0.1
 _BACKWARDS_MPS = -0.05
 # Consecutive reports that have to agree.
@@ -55,7 +56,7 @@ class Answer:
     dips: bool = False
 
 
-# It does what it is told.
+# The base follows its commands.
 ANSWERS = Answer()
 
 
@@ -114,7 +115,8 @@ class BaseAnswer:
     def _count(self, commanded_mps: float, measured_mps: float, least_mps: float) -> None:
         clear = least_mps >= _CLEAR_MPS
         runs = measured_mps > min(_FASTEST_SHARE * self._most.value + _FASTEST_MPS, self._too_fast_mps)
-        # On a ramp the least is far below the command: a base that tells of half would pass for a follower.
+        # Compare with the command too: on a ramp the least command is far below it, and a base that reports
+        # half of its speed would seem to follow.
         most_mps = max(least_mps, commanded_mps)
         self._followed = self._followed or (clear and measured_mps >= _FOLLOWS * most_mps)
         self._went_back = self._went_back and not self._followed

@@ -236,8 +236,8 @@ def _bisect_speed(
     free_m: float, a_mps2: float, towards_mps: float, latency_s: float, big_a: float, j: float
 ) -> float:
     """The rare states: the law is not one closed form, but it still grows with the speed."""
-    # Too fast: easing the acceleration off sheds a^2 / J at most, and from what is left v^2 / 2A is too far.
-    # free_m is below 0 only by rounding of what is next to nothing.
+    # high is an upper bound of the speed: easing the acceleration off sheds a^2 / J at most, and a stop from
+    # the rest takes v^2 / 2A, more than free_m. free_m is negative only by rounding.
     low, high = 0.0, math.sqrt(2.0 * big_a * max(free_m, 0.0)) + abs(a_mps2) + a_mps2**2 / j
     for _ in range(_NEWTON_STEPS):
         middle = 0.5 * (low + high)
@@ -273,7 +273,7 @@ def _speed_for(
     if math.isnan(free_m) or math.isnan(a_mps2) or math.isnan(closing_mps) or math.isnan(latency_s):
         return math.nan
     towards_mps = max(closing_mps, 0.0)
-    # Even who stands needs what comes nearer during the latency; whoever comes without end leaves no speed.
+    # What comes nearer during the latency is lost even to a standing robot; infinite values leave no speed.
     if not (free_m > towards_mps * latency_s and towards_mps + latency_s < math.inf):
         return 0.0
     if abs(a_mps2) > big_a:

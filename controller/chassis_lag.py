@@ -54,12 +54,14 @@ class ChassisLag:
         return _to_command_m(self._lag_s, self._drift_share, to_end_m, v_mps, a_mps2)
 
     def restart(self) -> None:
-        """Measure anew after another path or motion that was not commanded here; keep what was learnt."""
+        """Restart the measurement, after a new path or motion that was not commanded here; keep the lag."""
         self._commanded_m, self._started_at_m = 0.0, None
 
     def take_back(self) -> None:
-        """Forget what was learnt in the last two seconds, and learn nothing in the next: the chassis does not
-        follow then."""
+        """Undo what was learnt in the last two seconds, and learn nothing in the next two.
+
+        Call it when the chassis has not followed its commands.
+        """
         self._lag_s, self._drift_share, self._spread = self._kept[0]
         self._kept = deque([self._known], maxlen=_KEPT)
         self._skipped = _COASTS

@@ -1,4 +1,4 @@
-"""Whether the images contradict the odometry for so long that the base goes elsewhere than it reports.
+"""Whether the images contradict the odometry for long, so that the base does not go where it reports.
 
 Motors that are mirrored together with their encoders, a wrong scale of the counters, or tracks that spin on
 the spot do not show in what the base reports. Perception marks a frame as disputed where nearly all that it
@@ -15,7 +15,7 @@ from hal.records import record
 # Number of the last frames with a visual motion that are summed up: two seconds at 30 Hz. Frames for which
 # there is the odometry alone do not count; while the robot spins, most are of this kind.
 _FRAMES = 60
-# Maximum difference between the sums over the disputed frames: a constant, plus a share of what is told.
+# Maximum difference between the sums over the disputed frames: a constant, plus a share of the odometry's.
 _MAX_APART_M, _MAX_APART_RAD = 0.3, 0.3
 _MAX_SHARE = 0.5
 # Minimum sum of the odometry: a standing robot may see anything that passes close before it.

@@ -41,7 +41,7 @@ class GuardLimits:
 
     @classmethod
     def of(cls, limits: Limits, period_s: float) -> Self:
-        """The emergency limits are the outer bounds of everything the robot may ever be told."""
+        """The bounds of every command: the robot's limits, with those of an emergency stop for braking."""
         return cls(
             max_speed_mps=limits.max_speed_mps,
             max_yaw_rate_radps=limits.max_yaw_rate_radps,
@@ -87,7 +87,7 @@ def _jolt(setpoint: Setpoint, last: Setpoint, limits: GuardLimits) -> str:
             most = f"{-limits.max_decel_mps2:g}..{limits.max_accel_mps2:g}"
             return f"accelerates too hard: {a:.3f} m/s2, allowed {most}"
     if setpoint.v_mps == 0.0 and setpoint.a_mps2 == 0.0:
-        # Whatever deceleration is left at standstill ends there: the base cannot feel it.
+        # A deceleration that is left at standstill may end in one step: the base does not notice it.
         return ""
     jerk_mps3 = (setpoint.a_mps2 - last.a_mps2) / dt_s
     if not abs(jerk_mps3) <= limits.max_jerk_mps3 + _TOLERANCE:
@@ -96,7 +96,7 @@ def _jolt(setpoint: Setpoint, last: Setpoint, limits: GuardLimits) -> str:
 
 
 def self_check(limits: GuardLimits) -> str:
-    """Does the gate still pass what is right and stop what is wrong? What it got wrong; "" if nothing."""
+    """Try the gate with good and bad setpoints. Returns its first mistake; "" if there is none."""
     now_ns, p, nan = 10 * NS_PER_S, limits.period_s, math.nan
     before_ns = now_ns - round(p * NS_PER_S) if 0.0 < p < 1.0 else 0
     top = Setpoint(before_ns, limits.max_speed_mps, 0.0, 0.0)
@@ -197,7 +197,7 @@ class GuardedChassis(DeviceWrapper):
         """Release the latch if the driver has accepted the consent, too; otherwise keep its refusal."""
         if state.mode in (ChassisMode.ARMING, ChassisMode.ARMED):
             self._violation = ""
-        elif self._violation and state.mode not in LATCHED_MODES:  # whose reason is told beside ours
+        elif self._violation and state.mode not in LATCHED_MODES:  # the reason of a latch is shown too
             self._refusal = state.reason.rpartition("arming refused: ")[2]
 
     def _told(self, state: ChassisState) -> ChassisState:

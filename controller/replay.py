@@ -188,7 +188,7 @@ def _counts(tally: ReplayTally) -> str:
 
 
 def _mount_notes(options: ReplayOptions, config: ReplayConfig, recorded: CameraMount | None) -> Iterator[str]:
-    """What is used where the recording tells no mounting, or another one than was configured."""
+    """Notes on the mounting, where the recording has none, or another one than the configuration."""
     given = config.robot.camera_mount
     if recorded is None:
         yield _assumed(options, config)

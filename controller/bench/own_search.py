@@ -1,4 +1,8 @@
-"""OpenCV's Lucas-Kanade for what perception searches by its own: with it, the bare calls do the same work."""
+"""OpenCV's counterpart of perception's own Lucas-Kanade, for the comparison with bare OpenCV calls.
+
+Perception searches with vision/fragments/lucas_kanade.py. For a fair comparison the bare calls have to do the
+same work, so each search is recorded as the call of OpenCV that finds the same.
+"""
 
 from __future__ import annotations
 
@@ -13,8 +17,9 @@ from controller.bench.opencv_calls import OpenCvCall
 from vision.fragments import lucas_kanade
 from vision.fragments.edges import GreyImage
 
-_CRITERIA = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 10, 0.02)  # as in lucas_kanade.py
-_MIN_EIGENVALUE = 1e-5  # the same as there, in OpenCV's units
+# Iterations, convergence and least eigenvalue are those of lucas_kanade.py; test_own_search.py compares them.
+_CRITERIA = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 10, 0.02)
+_MIN_EIGENVALUE = 1e-5  # in OpenCV's units: (grey levels / px)^2 / 1024, per pixel of the window
 # The minimum eigenvalue is available anyway; OpenCV would compute its other error measure pixel by pixel.
 _FLAGS = cv2.OPTFLOW_USE_INITIAL_FLOW | cv2.OPTFLOW_LK_GET_MIN_EIGENVALS
 

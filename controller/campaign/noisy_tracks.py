@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from config.camera import SimulatedCameraConfig
 from controller.campaign.noise_model import NoiseModel
-from controller.campaign.view import PlanarCamera, PlanarView
+from controller.campaign.view import Eye, PlanarCamera, PlanarView
 from hal.compiled import compiled, inlined
 from hal.types import FloatArray
 from vision.scene import Obstacle
@@ -77,7 +77,7 @@ class NoisyTracks:
             camera.half_width_tan,
             camera.range_m,
             self._min_depth_m,
-            *view.camera_pose,
+            view.camera_pose,
             t_s,
             self._period_s,
             noise.miss_rate,
@@ -96,7 +96,7 @@ class NoisyTracks:
             self._tracks,
             self._centre_height_m,
             self._to_optical,
-            *view.camera_pose,
+            view.camera_pose,
             t_s,
             noise.sightings,
             noise.tracked_depth_ratio * noise.depth_sigma_1pm,
@@ -184,8 +184,8 @@ def _update_motion(track: FloatArray, fast: bool, dt_s: float, rise_s: float, fa
 
 @compiled(
     "float64[:, ::1], int64[::1], float64[:, ::1], boolean[::1], float64[::1], float64[::1],"
-    "float64, float64, float64, float64, float64, float64, float64, float64, float64, float64, float64,"
-    "float64, float64, float64, float64, float64"
+    "float64, float64, float64, UniTuple(float64, 4), float64, float64, float64, float64, float64, float64,"
+    "float64, float64, float64"
 )
 def _updated(
     tracks: FloatArray,
@@ -197,10 +197,7 @@ def _updated(
     half_width_tan: float,
     range_m: float,
     min_depth_m: float,
-    camera_x: float,
-    camera_y: float,
-    cos: float,
-    sin: float,
+    eye: Eye,
     t_s: float,
     dt_s: float,
     miss_rate: float,
@@ -213,6 +210,7 @@ def _updated(
 ) -> FloatArray:
     """The tracks (N, C) after a frame that shows bodies (M,) at distances forward_m (M, B). A body is missed
     if its random draw (N,) in 0..1 is less than the miss rate at its distance."""
+    camera_x, camera_y, cos, sin = eye
     tracks = tracks.copy()
     last_id = tracks[:, _ID].max() if len(tracks) else 0.0
     for row in range(len(bodies)):
@@ -241,17 +239,14 @@ def _updated(
 
 
 @compiled(
-    "float64[:, ::1], float64[::1], float64[:, ::1], float64, float64, float64, float64, float64, int64,"
+    "float64[:, ::1], float64[::1], float64[:, ::1], UniTuple(float64, 4), float64, int64,"
     "float64, float64, float64, float64, float64, float64, float64, float64"
 )
 def _reported(
     tracks: FloatArray,
     centre_height_m: FloatArray,
     to_optical: FloatArray,
-    camera_x: float,
-    camera_y: float,
-    cos: float,
-    sin: float,
+    eye: Eye,
     t_s: float,
     sightings: int,
     depth_sigma_1pm: float,
@@ -265,6 +260,7 @@ def _reported(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """The R bodies that are reported: id, whether it moves, times since its first and last sighting (R, 4);
     position, extent and velocity in optical axes (R, 3, 3); covariance of the velocity (R, 3, 3)."""
+    camera_x, camera_y, cos, sin = eye
     count, found = len(tracks), 0
     reported, vectors, covariances = np.empty((count, 4)), np.empty((count, 3, 3)), np.empty((count, 3, 3))
     for k in range(count):

@@ -19,6 +19,9 @@ from vision.scene import NEVER_M
 IntArray = NDArray[np.intp]
 BoolArray = NDArray[np.bool_]
 
+# x_m and y_m of the camera on the floor, and the cosine and sine of where it looks.
+Eye = tuple[float, float, float, float]
+
 BANDS = 80
 _NEAR_M = 0.1
 _TOLERANCE_M = 1e-6
@@ -38,7 +41,7 @@ class PlanarView:
     bodies: IntArray
     forward_m: FloatArray
     free_m: FloatArray
-    camera_pose: tuple[float, float, float, float]
+    camera_pose: Eye
 
 
 class PlanarCamera:
@@ -86,13 +89,12 @@ class PlanarCamera:
             self._mount.height_m,
             self._down_tan,
             self.up_tan,
-            *camera_pose,
+            camera_pose,
         )
         return PlanarView(bodies, forward_m, free_m, camera_pose)
 
-    def camera_pose(self, pose: PlanarPose) -> tuple[float, float, float, float]:
-        """x_m and y_m of the camera on the floor, and cosine and sine of its heading, for the robot at
-        pose."""
+    def camera_pose(self, pose: PlanarPose) -> Eye:
+        """The camera of a robot at pose."""
         cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
         forward_m, left_m = self._mount.forward_m, self._mount.left_m
         return (
@@ -106,15 +108,13 @@ class PlanarCamera:
 @inlined
 def _in_camera(
     polygon: FloatArray,
-    camera_x: float,
-    camera_y: float,
-    cos: float,
-    sin: float,
+    eye: Eye,
     forward: FloatArray,
     right: FloatArray,
 ) -> None:
     """Transform the corners (K, 2) to distances forward and right of the camera, (K + 1,) each: the first
     corner is repeated at the end."""
+    camera_x, camera_y, cos, sin = eye
     count = len(polygon)
     for j in range(count + 1):
         dx, dy = polygon[j % count, 0] - camera_x, polygon[j % count, 1] - camera_y
@@ -170,7 +170,7 @@ def _add_thin_body(
 
 @compiled(
     "float64[:, :, ::1], float64[:, ::1], float64[:, ::1], boolean[::1], float64[::1], float64, float64,"
-    "float64, float64, float64, float64, float64, float64, float64, float64"
+    "float64, float64, float64, float64, UniTuple(float64, 4)"
 )
 def _render(
     polygons: FloatArray,
@@ -184,20 +184,17 @@ def _render(
     camera_height_m: float,
     down_tan: float,
     up_tan: float,
-    camera_x: float,
-    camera_y: float,
-    cos: float,
-    sin: float,
+    eye: Eye,
 ) -> tuple[IntArray, FloatArray, FloatArray]:
-    """The fields of PlanarView for a camera at camera_x, camera_y, camera_height_m above the floor."""
+    """The fields of PlanarView for a camera at eye, camera_height_m above the floor."""
     count, corners, bands = len(polygons), polygons.shape[1], len(bearing_tan)
     bodies, hits = np.empty(count, np.intp), np.empty((count, bands))
     forward, right, free = np.empty(len(room) + 1), np.empty(len(room) + 1), np.empty(bands)
-    _in_camera(room, camera_x, camera_y, cos, sin, forward, right)
+    _in_camera(room, eye, forward, right)
     _cast_rays(forward, right, bearing_tan, free)
     forward, right, in_view = np.empty(corners + 1), np.empty(corners + 1), 0
     for k in range(count):
-        _in_camera(polygons[k], camera_x, camera_y, cos, sin, forward, right)
+        _in_camera(polygons[k], eye, forward, right)
         if not _may_be_in_view(forward, right, edge_tan, range_m):
             continue
         if not _cast_rays(forward, right, bearing_tan, hits[in_view]):

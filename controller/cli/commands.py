@@ -158,7 +158,7 @@ def main() -> None:
     except click.ClickException as error:
         _refuse(error.format_message())
     except click.Abort as error:
-        # Where something can be said of what was done, the command raises Interrupted itself.
+        # A command that can say what it has done so far raises Interrupted instead.
         raise KeyboardInterrupt from error
     except Interrupted as error:
         _say(f"interrupted: {error}")

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class WholeNumber(click.IntRange):
-    """click.IntRange, which calls what is no number at all no valid "integer range"."""
+    """click.IntRange with another name: its message for "x" would be: not a valid integer range."""
 
     name = "whole number"
 

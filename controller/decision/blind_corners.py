@@ -9,6 +9,7 @@ controller/decision/sight.py calls BlindCorners once a scene.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,12 +40,37 @@ _SURE_M = 3.2
 _MIN_SCORE, _MAX_SCORE = 3, 8
 
 
+@record(frozen=True, slots=True, eq=False)
+class SurfacesOnPath:
+    """P surfaces in path coordinates, left to right.
+
+    bands, forward_m: (P,) band of the scan, and distance ahead of the camera.
+    s_m, d_m: (P,) along the path and to its left.
+    half_width_m: (P,) half of the swept width there.
+    """
+
+    bands: IntArray
+    forward_m: FloatArray
+    s_m: FloatArray
+    d_m: FloatArray
+    half_width_m: FloatArray
+
+
 @dataclass(slots=True)
 class _Corner:
     s_m: float
     left: bool
     beside_m: float
     score: int
+
+
+class _Points(NamedTuple):
+    """P surfaces for the compiled steps; the fields of SurfacesOnPath."""
+
+    bands: IntArray
+    forward_m: FloatArray
+    s_m: FloatArray
+    d_m: FloatArray
 
 
 @record(frozen=True, slots=True)
@@ -64,30 +90,31 @@ class BlindCorners:
 
     def look(
         self,
-        bands: IntArray,
-        forward_m: FloatArray,
-        s_m: FloatArray,
-        d_m: FloatArray,
-        half_width_m: FloatArray,
+        surfaces: SurfacesOnPath,
+        stands: NDArray[np.bool_],
         band_tan: float,
         front_s_m: float,
-        stands: NDArray[np.bool_],
     ) -> None:
         """Take in the P surfaces of one scene, in the order of their bands.
 
-        bands, forward_m: (P,) band, and distance ahead of the camera.
-        s_m, d_m: (P,) path coordinates.
-        half_width_m: (P,) half of the swept width there.
-        band_tan: width of a band.
-        front_s_m: path coordinate of the robot's front.
-        stands: (P,) whether the surface belongs to no mover. Movers are no faces, least of all people who
-        walk one behind the other.
+        stands: (P,) whether a surface belongs to no mover. Movers are no faces, least of all people who walk
+        one behind the other.
+        band_tan: width of a band. front_s_m: path coordinate of the robot's front.
         """
         for corner in self._corners:
             # Nearer than _SURE_M, a corner is not given up for not being seen.
             corner.score -= 1 if corner.s_m - front_s_m > _SURE_M else 0
-        ends = _faces_end(
-            bands, forward_m, s_m, d_m, half_width_m, stands, band_tan, front_s_m, self._beside_m
+        s_m, d_m, half_width_m = surfaces.s_m, surfaces.d_m, surfaces.half_width_m
+        ends = _blind_ends(
+            surfaces.bands,
+            surfaces.forward_m,
+            s_m,
+            d_m,
+            half_width_m,
+            stands,
+            band_tan,
+            front_s_m,
+            self._beside_m,
         )
         for end in ends.tolist():
             beside_m = float(abs(d_m[end]) - half_width_m[end])
@@ -120,18 +147,37 @@ def _band_spacing_m(forward_m: float, d_m: float, band_tan: float) -> float:
 
 
 @inlined
-def _passage_behind(end: int, beyond: int, bands: IntArray, forward_m: FloatArray, min_jump_m: float) -> bool:
-    """Whether depth jumps by more than min_jump_m past the end of a face, or the next band has no surface.
+def _goes_on(points: _Points, last: int, k: int, band_tan: float) -> bool:
+    """Whether point k belongs to the same face as the point last."""
+    along_m = points.s_m[k] - points.s_m[last]
+    spacing_m = _band_spacing_m(points.forward_m[last], points.d_m[last], band_tan)
+    return bool(
+        abs(points.bands[k] - points.bands[last]) == 1
+        and -_STEP_ASIDE_M < along_m < _SLACK * spacing_m + _STEP_ASIDE_M
+        and abs(points.d_m[k] - points.d_m[last]) < _STEP_ASIDE_M
+    )
 
-    A passage may be hidden there.
-    """
-    if not 0 <= beyond < len(bands) or abs(bands[beyond] - bands[end]) != 1:
+
+@inlined
+def _passage_behind(points: _Points, end: int, beyond: int, band_tan: float) -> bool:
+    """Whether a passage may be hidden past the end of a face: the next band, that of point beyond, has no
+    surface, or one that is farther away by more than a passage."""
+    if not 0 <= beyond < len(points.bands) or abs(points.bands[beyond] - points.bands[end]) != 1:
         return True
-    return bool(forward_m[beyond] - forward_m[end] > min_jump_m)
+    min_jump_m = _PASSAGE_M + _band_spacing_m(points.forward_m[end], points.d_m[end], band_tan)
+    return bool(points.forward_m[beyond] - points.forward_m[end] > min_jump_m)
+
+
+@inlined
+def _ends_blind(points: _Points, first: int, last: int, inward: int, band_tan: float) -> bool:
+    """Whether the face from point first to last is long enough, and a passage may be hidden behind it."""
+    if last < 0 or not points.s_m[last] - points.s_m[first] >= _FACE_M:
+        return False
+    return _passage_behind(points, last, last + inward, band_tan)
 
 
 @compiled("int64[:], float64[:], float64[:], float64[:], float64[:], boolean[:], float64, float64, float64")
-def _faces_end(
+def _blind_ends(
     bands: IntArray,
     forward_m: FloatArray,
     s_m: FloatArray,
@@ -142,34 +188,29 @@ def _faces_end(
     front_s_m: float,
     max_beside_m: float,
 ) -> IntArray:
-    """(E,) which of the surfaces (P,) are far ends of long faces; the arguments are those of look()."""
-    count, found = len(bands), 0
+    """(E,) which of the surfaces (P,) are far ends of long faces that may hide somebody; arguments of look().
+
+    max_beside_m: faces farther beside the swept width do not matter.
+    """
+    points, count, found = _Points(bands, forward_m, s_m, d_m), len(bands), 0
     ends = np.empty(count, np.intp)
     for inward in (-1, 1):
         # Each side is followed from the edge of the view inwards; on the right that is from the last band
         # to the first.
-        began = last = -1
-        for n in range(count + 1):
+        first = last = -1  # of the present face; -1: none yet
+        for n in range(count):
             k = n if inward > 0 else count - 1 - n
-            if n < count:
-                aside_m = abs(d_m[k]) - half_width_m[k]
-                close = stands[k] and 0.0 < aside_m <= max_beside_m and s_m[k] - front_s_m < _LOOK_AHEAD_M
-                if not close or (d_m[k] > 0.0) != (inward > 0):
-                    continue
-                if last >= 0:
-                    along_m = s_m[k] - s_m[last]
-                    spacing_m = _band_spacing_m(forward_m[last], d_m[last], band_tan)
-                    if (
-                        abs(bands[k] - bands[last]) == 1
-                        and -_STEP_ASIDE_M < along_m < _SLACK * spacing_m + _STEP_ASIDE_M
-                        and abs(d_m[k] - d_m[last]) < _STEP_ASIDE_M
-                    ):
-                        last = k
-                        continue
-            if last >= 0 and s_m[last] - s_m[began] >= _FACE_M:
-                min_jump_m = _PASSAGE_M + _band_spacing_m(forward_m[last], d_m[last], band_tan)
-                if _passage_behind(last, last + inward, bands, forward_m, min_jump_m):
+            aside_m = abs(d_m[k]) - half_width_m[k]
+            close = stands[k] and 0.0 < aside_m <= max_beside_m and s_m[k] - front_s_m < _LOOK_AHEAD_M
+            if not close or (d_m[k] > 0.0) != (inward > 0):
+                continue
+            if last < 0 or not _goes_on(points, last, k, band_tan):
+                if _ends_blind(points, first, last, inward, band_tan):
                     ends[found] = last
                     found += 1
-            began = last = k
+                first = k
+            last = k
+        if _ends_blind(points, first, last, inward, band_tan):
+            ends[found] = last
+            found += 1
     return ends[:found]

@@ -17,7 +17,7 @@ class Debounced:
         self._otherwise_since_s: dict[int, float] = {}
 
     def pause(self) -> None:
-        """Nothing is looked at now: this is a break in what is seen. The flags stay as they are."""
+        """Note a break in the observations: times start anew after it. The flags stay as they are."""
         self._otherwise_since_s.clear()
 
     def update(self, ids: NDArray[np.int64], seen: BoolArray, at_once: BoolArray, now_s: float) -> BoolArray:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.decision import DecisionConfig
-from controller.decision.blind_corners import BlindCorners
+from controller.decision.blind_corners import BlindCorners, SurfacesOnPath
 from controller.decision.bodies import Bodies
 from controller.decision.corridor import Corridor
 from controller.decision.surfaces import Surfaces, seen_of
@@ -34,6 +34,8 @@ _LANES = 5  # points across the width of a cell
 # If the view's upper edge hardly rises, a surface that vanishes farther away than this has not gone out of
 # view upwards: it was flicker.
 _MAX_ABOVE_M = 3.0
+# Surfaces are looked for this much farther along the path than the range of sight.
+_BEYOND_RANGE_M = 2.0
 # The median of this many scenes counts: one outlier must not brake; three frames are a tenth of a second.
 _FRAMES = 5
 # A surface that recedes by more than this has left the view; less is depth noise.
@@ -86,36 +88,29 @@ class Sight:
         explained_by: bodies; a surface that belongs to one of them is no obstacle of its own.
         """
         self._update_view_edges(free)
-        bands, forward, points = surfaces.bands, surfaces.forward_m, surfaces.points_m
-        surface_s, surface_d = self._corridor.path.project_points(
-            points, s_m, s_m + self._sight.range_m + 2.0
-        )
-        half_width = self._corridor.half_width(surface_s)
-        belongs = surfaces.of(explained_by)
+        on_path = self._on_path(surfaces, s_m)
         in_corridor, nearest_s, stands = _surfaces_in_corridor(
-            bands,
-            surface_s,
-            surface_d,
-            half_width,
+            on_path.bands,
+            on_path.s_m,
+            on_path.d_m,
+            on_path.half_width_m,
             surfaces.half_band_m,
-            belongs,
+            surfaces.of(explained_by),
             explained_by.moving,
             s_m,
             self._lateral_m,
             len(free.bearing_tan),
         )
-        self.corners.look(
-            bands,
-            forward,
-            surface_s,
-            surface_d,
-            half_width,
-            2.0 * free.half_width_tan,
-            s_m + self._corridor.front_m,
-            stands,
-        )
+        self.corners.look(on_path, stands, 2.0 * free.half_width_tan, s_m + self._corridor.front_m)
         self._note_surface(nearest_s, s_m, standing)
         self._note_floor(free, pose, s_m, captured_ns, in_corridor)
+
+    def _on_path(self, surfaces: Surfaces, s_m: float) -> SurfacesOnPath:
+        """The surfaces in path coordinates, as far as the camera sees from s_m."""
+        to_s_m = s_m + self._sight.range_m + _BEYOND_RANGE_M
+        surface_s_m, surface_d_m = self._corridor.path.project_points(surfaces.points_m, s_m, to_s_m)
+        half_width_m = self._corridor.half_width(surface_s_m)
+        return SurfacesOnPath(surfaces.bands, surfaces.forward_m, surface_s_m, surface_d_m, half_width_m)
 
     def _update_view_edges(self, free: FreeSpace) -> None:
         """Take in where the view begins and ends, if that has changed.

@@ -14,22 +14,31 @@ from hal.records import record
 from hal.types import CameraMount, FloatArray, PlanarPose
 from vision.scene import FreeSpace
 
+# x_m and y_m of the camera on the floor, and the cosine and sine of where it looks.
+Eye = tuple[float, float, float, float]
+
 # A point this near to an obstacle's box is part of it: swinging limbs, a box that lags a little.
 AROUND_M = 0.3
 _DEPTH_SIGMAS = 3.5
-# Bands stand side by side: the middles of two are as far apart as a band is wide, to such a share.
+# Bands lie side by side: the distance of their middles differs from their width by this share at most.
 _APART = 0.1
 _NO_SCAN = "the scan of the free space is impossible"
-# In the order in which _impossible() looks at them.
-_LOOKED_AT = ("half_width_tan", "blind_m", "floor_from_m", "up_tan", "bearing_tan", "nearest_m", "known_m")
+# In the order in which _impossible() checks them.
+_CHECKED = ("half_width_tan", "blind_m", "floor_from_m", "up_tan", "bearing_tan", "nearest_m", "known_m")
 
 
 @record(frozen=True, slots=True, eq=False)
 class Surfaces:
-    """P points, left to right. bands (P,): of the B bands of the free space, which they are of. forward_m
-    (P,) from the camera. half_band_m (P,): half of the width that a point stands for. points_m (P, 2). seen_m
-    (B,): how far each band was seen through, to a surface or over free floor; 0: nothing was measured.
-    noise: of the camera's depth."""
+    """P points on the floor where depth sees something, left to right, and how far it sees in B bands.
+
+    seen_m: (B,) how far each band of the scan was seen through, to a surface or over free floor; 0: nothing
+        was measured.
+    bands: (P,) the band of each point.
+    forward_m: (P,) distance ahead of the camera.
+    half_band_m: (P,) half of the band's width there: a point stands for that much to either side.
+    points_m: (P, 2) in the frame of the path.
+    noise: of the camera's depth.
+    """
 
     seen_m: FloatArray
     bands: NDArray[np.intp]
@@ -39,7 +48,7 @@ class Surfaces:
     noise: DepthNoise = TYPICAL_DEPTH_NOISE
 
     def of(self, bodies: Bodies) -> NDArray[np.bool_]:
-        """(P, N) which points belong to which bodies: along the view, depth may be off."""
+        """(P, N) which points belong to which bodies. Along the view the tolerance grows with depth noise."""
         reach_m = _reach_m(self.forward_m, _DEPTH_SIGMAS * self.noise.quadratic_per_m)
         return bodies.covers(self.points_m, reach_m, AROUND_M)
 
@@ -48,8 +57,10 @@ NO_SURFACES = Surfaces(np.zeros(0), np.zeros(0, np.intp), np.zeros(0), np.zeros(
 
 
 def check_scan(free: FreeSpace) -> None:
-    """Raises SceneError where free does not tell the same of every band (what reads it goes by number), or
-    tells what cannot be: NaN compares as free somewhere, and a distance below 0 is nowhere ahead."""
+    """Raises SceneError if the arrays of free differ in length or type, or hold impossible values.
+
+    Compiled steps index them without checks, NaN would compare as free, and no distance is negative.
+    """
     bands = free.bearing_tan.shape
     blank = np.zeros(bands, np.bool_) if free.blank is None else free.blank
     alike = len(bands) == 1 and free.nearest_m.shape == free.known_m.shape == blank.shape == bands
@@ -66,7 +77,7 @@ def check_scan(free: FreeSpace) -> None:
     )
     if wrong < 0:
         return
-    name, value = _LOOKED_AT[wrong], getattr(free, _LOOKED_AT[wrong])
+    name, value = _CHECKED[wrong], getattr(free, _CHECKED[wrong])
     if band >= 0:
         raise SceneError(f"{_NO_SCAN}: {name} of band {band} is {value[band]:g}")
     raise SceneError(f"{_NO_SCAN}: {name} is {value:g}")
@@ -75,13 +86,9 @@ def check_scan(free: FreeSpace) -> None:
 def surfaces_of(
     free: FreeSpace, pose: PlanarPose, mount: CameraMount, noise: DepthNoise = TYPICAL_DEPTH_NOISE
 ) -> Surfaces:
-    """What was seen of free by a camera that a body at pose carried. noise: of its depth."""
+    """The surfaces of free, seen by the camera of a robot at pose. noise: of its depth."""
     seen_m, bands, forward, half_band_m, points = _surfaces(
-        free.bearing_tan,
-        free.half_width_tan,
-        free.nearest_m,
-        free.known_m,
-        *_eye(pose, mount),
+        free.bearing_tan, free.half_width_tan, free.nearest_m, free.known_m, _eye(pose, mount)
     )
     return Surfaces(seen_m, bands, forward, half_band_m, points, noise)
 
@@ -98,14 +105,17 @@ def floor_points(pose: PlanarPose, ahead_m: FloatArray, left_m: FloatArray) -> F
 def bands_at(
     free: FreeSpace, pose: PlanarPose, mount: CameraMount, x_m: FloatArray, y_m: FloatArray
 ) -> tuple[FloatArray, NDArray[np.intp]]:
-    """(...) each: how far ahead of the camera floor points x_m (...), y_m (...) lie, in metres, and in which
-    band of free. A number that none of them has is beside the view; behind the camera it means nothing."""
+    """Where floor points x_m (...), y_m (...) lie in the scan.
+
+    Returns the distance ahead of the camera in metres, and the band, (...) each. A band number outside of
+    0..B - 1 is beside the view. Behind the camera the number has no meaning.
+    """
     forward, band = _bands_at(
         x_m.reshape(-1),
         y_m.reshape(-1),
         free.bearing_tan[0] - free.half_width_tan,
         2.0 * free.half_width_tan,
-        *_eye(pose, mount),
+        _eye(pose, mount),
     )
     return forward.reshape(x_m.shape), band.reshape(x_m.shape)
 
@@ -119,8 +129,11 @@ def seen_of(
     least_m: float,
     hides: NDArray[np.bool_],
 ) -> NDArray[np.int64]:
-    """(R,) how many of R rows of floor points (2, R, K) were seen as free, up to before_m behind them, or lie
-    behind a surface in a band that hides (B,) what is behind it. Nearer than least_m none is seen."""
+    """(R,) how many points of each of R rows of floor points (2, R, K) count as seen.
+
+    These are seen free up to before_m behind them, or they lie behind a surface in a band for which hides
+    (B,) is set. Points nearer than least_m do not count.
+    """
     return _seen_of(
         points_m,
         before_m,
@@ -130,12 +143,12 @@ def seen_of(
         least_m,
         free.bearing_tan[0] - free.half_width_tan,
         2.0 * free.half_width_tan,
-        *_eye(pose, mount),
+        _eye(pose, mount),
     )
 
 
-def _eye(pose: PlanarPose, mount: CameraMount) -> tuple[float, float, float, float]:
-    """x_m and y_m of the camera on the floor, and the cosine and sine of where it looks."""
+def _eye(pose: PlanarPose, mount: CameraMount) -> Eye:
+    """The camera of a robot at pose."""
     cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
     return (
         pose.x_m + mount.forward_m * cos - mount.left_m * sin,
@@ -155,7 +168,7 @@ def _impossible(
     floor_from_m: float,
     up_tan: float,
 ) -> tuple[int, int]:
-    """Which of _LOOKED_AT cannot be and, of what is told of bands, in which band; -1 for what is none."""
+    """Index in _CHECKED of the first impossible value, and its band; -1: none, or not of a single band."""
     # Written so that NaN fails every comparison.
     if not 0.0 < half_width_tan < math.inf:
         return 0, -1
@@ -179,22 +192,20 @@ def _impossible(
 
 @compiled("float64[:], float64")
 def _reach_m(forward_m: FloatArray, off_per_m: float) -> FloatArray:
-    """(P,) so far along the view a point may be off a body that it belongs to."""
+    """(P,) maximum distance along the view between a point and a body that it belongs to."""
     return AROUND_M + off_per_m * forward_m * forward_m
 
 
-@compiled("float64[:], float64, float64[:], float64[:], float64, float64, float64, float64")
+@compiled("float64[:], float64, float64[:], float64[:], UniTuple(float64, 4)")
 def _surfaces(
     bearing_tan: FloatArray,
     half_width_tan: float,
     nearest_m: FloatArray,
     known_m: FloatArray,
-    eye_x: float,
-    eye_y: float,
-    cos: float,
-    sin: float,
+    eye: Eye,
 ) -> tuple[FloatArray, NDArray[np.intp], FloatArray, FloatArray, FloatArray]:
-    """The fields of Surfaces, for a camera at eye_x, eye_y that looks along cos, sin."""
+    """The fields of Surfaces, for a camera at eye."""
+    eye_x, eye_y, cos, sin = eye
     count, found = len(bearing_tan), 0
     seen, bands, forward = np.empty(count), np.empty(count, np.intp), np.empty(count)
     half_band, points = np.empty(count), np.empty((count, 2))
@@ -219,48 +230,34 @@ def _band_at(
     y_m: float,
     first_tan: float,
     width_tan: float,
-    eye_x: float,
-    eye_y: float,
-    cos: float,
-    sin: float,
+    eye: Eye,
 ) -> tuple[float, int]:
-    """bands_at() for one point; the first band begins at first_tan, each is width_tan wide."""
+    """As bands_at, for one point; the first band begins at first_tan, each is width_tan wide."""
+    eye_x, eye_y, cos, sin = eye
     dx, dy = x_m - eye_x, y_m - eye_y
     forward, right = dx * cos + dy * sin, dx * sin - dy * cos
     band = (right / max(forward, 1e-3) - first_tan) / width_tan
     return forward, math.floor(band) if math.isfinite(band) else -1
 
 
-@compiled("float64[:], float64[:], float64, float64, float64, float64, float64, float64")
+@compiled("float64[:], float64[:], float64, float64, UniTuple(float64, 4)")
 def _bands_at(
     x_m: FloatArray,
     y_m: FloatArray,
     first_tan: float,
     width_tan: float,
-    eye_x: float,
-    eye_y: float,
-    cos: float,
-    sin: float,
+    eye: Eye,
 ) -> tuple[FloatArray, NDArray[np.intp]]:
-    """bands_at() for points (P,)."""
+    """As bands_at, for points (P,)."""
     forward, band = np.empty(len(x_m)), np.empty(len(x_m), np.intp)
     for k in range(len(x_m)):
-        forward[k], band[k] = _band_at(
-            x_m[k],
-            y_m[k],
-            first_tan,
-            width_tan,
-            eye_x,
-            eye_y,
-            cos,
-            sin,
-        )
+        forward[k], band[k] = _band_at(x_m[k], y_m[k], first_tan, width_tan, eye)
     return forward, band
 
 
 @compiled(
     "float64[:, :, :], float64, boolean[:], float64[:], float64[:], float64,"
-    "float64, float64, float64, float64, float64, float64"
+    "float64, float64, UniTuple(float64, 4)"
 )
 def _seen_of(
     points_m: FloatArray,
@@ -271,25 +268,14 @@ def _seen_of(
     least_m: float,
     first_tan: float,
     width_tan: float,
-    eye_x: float,
-    eye_y: float,
-    cos: float,
-    sin: float,
+    eye: Eye,
 ) -> NDArray[np.int64]:
-    """seen_of() of the same camera."""
+    """As seen_of; the first band begins at first_tan, each is width_tan wide."""
     seen = np.zeros(points_m.shape[1], np.int64)
     for row in range(points_m.shape[1]):
         for k in range(points_m.shape[2]):
-            forward, b = _band_at(
-                points_m[0, row, k],
-                points_m[1, row, k],
-                first_tan,
-                width_tan,
-                eye_x,
-                eye_y,
-                cos,
-                sin,
-            )
+            x_m, y_m = points_m[0, row, k], points_m[1, row, k]
+            forward, b = _band_at(x_m, y_m, first_tan, width_tan, eye)
             if not (0 <= b < len(known_m) and forward > least_m):
                 continue
             reach_m = forward + before_m

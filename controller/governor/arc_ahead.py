@@ -82,7 +82,7 @@ class ArcAhead:
         return path
 
     def _look_again(self, path: Path, v_mps: float) -> WorldModel:
-        """What the last scenes and the arc before tell of the way along path."""
+        """A world model for path, from the last scenes and the world model of the arc before."""
         before = self.known
         known = self._decide.world_model(path, self._known_from_m)
         for scene in self._scenes:

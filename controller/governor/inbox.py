@@ -158,7 +158,8 @@ class Inbox:
             return self._drop("clock went back", f"t_s of seq {request.seq} went back by {back_s:.3f} s")
         late_s = session.lateness_s(offset_s, now_ns)
         if late_s > self._config.late_s:
-            # A message that was held up follows one that was in time. If each is later, the clock runs slow.
+            # A single message that was held up follows one that was in time. If every message is later than
+            # the one before, the sender's clock runs slow.
             grows = session.late_s > _GROWN * self._config.late_s
             slow = ", each later than the one before: does its clock run slow?" if grows else ""
             return self._drop("late", f"seq {request.seq} came {late_s:.2f} s late{slow}")

@@ -16,13 +16,13 @@ _log = logging.getLogger(__name__)
 
 
 class ReopeningLink(ABC, Generic[DeviceT]):
-    """After LinkLost the next use opens the device anew, so that a re-plugged adapter is found again; whoever
-    uses the link decides how often. where: how messages name it. close_errors: what closing a lost device
-    may raise.
+    """A link whose next use after LinkLost opens the device again, so that a re-plugged adapter is found.
 
-    slow: opening and closing it may take long, over a network above all. Then one thread after it was lost
-    closes it and opens it anew, in this order, for what closing says late would reach the new one. Meanwhile
-    every use raises LinkLost; ``with`` waits.
+    The user of the link decides how often that is tried.
+    where: how messages name the device. close_errors: what closing a lost device may raise.
+    slow: opening and closing may take long, above all over a network. Then a thread of its own closes the
+    lost device and opens it again, in this order: a late message of the old one would else reach the new one.
+    Meanwhile every use raises LinkLost; ``with`` waits.
     """
 
     def __init__(self, where: str, close_errors: tuple[type[Exception], ...], slow: bool = False) -> None:
@@ -154,7 +154,7 @@ class _OpenAttempt(Generic[DeviceT]):
         except HalError as error:
             self._error = error
         finally:
-            # Whoever abandons it right after this closes it: which of the two does is settled in here.
+            # The lock settles who closes a device that is abandoned right now: this thread, or the caller.
             with self._lock:
                 if self._wanted:
                     self._device, device = device, None

@@ -1,5 +1,6 @@
-"""The package names at the top level are common words: make sure that ours are the ones that load."""
+"""The packages: ours are the ones that load, though their names are common; imports; lists of files."""
 
+import ast
 import importlib
 import re
 from pathlib import Path
@@ -21,6 +22,17 @@ def test_each_package_loads_from_this_project(name: str) -> None:
 def test_no_package_imports_the_tests(name: str) -> None:
     importing = re.compile(r"^\s*(from|import)\s+tests\b", re.MULTILINE)
     assert [str(path) for path in (ROOT / name).rglob("*.py") if importing.search(path.read_text())] == []
+
+
+@pytest.mark.parametrize("name", [*PACKAGES, "tests/support"])
+def test_the_docstring_of_each_folder_lists_all_of_its_files(name: str) -> None:
+    missing = []
+    for init in (ROOT / name).rglob("__init__.py"):
+        listed = set(re.findall(r"\w+", ast.get_docstring(ast.parse(init.read_text())) or ""))
+        files = {path.stem for path in init.parent.glob("*.py")} - {"__init__"}
+        folders = {path.parent.name for path in init.parent.glob("*/__init__.py")}
+        missing += [str(init.parent / each) for each in (files | folders) - listed]
+    assert missing == []
 
 
 # Neither devices nor emulators: what to look for in a bag, a folder on the disk, the simulated outside.

@@ -17,6 +17,7 @@ Files, in the order in which they come into play within one frame (vision/tracke
 * sightings - the Kalman filters are updated by the centroids of the visible surfaces.
 * adoption - each fragment is assigned to a track.
 * proof - what one frame proves of each track: moving, standing still or neither.
+* proof_rules - the rules for that, one function each.
 * judgement - the proofs are added up over frames to a verdict with hysteresis.
 * report - tracks and fragments are written into the Scene.
 """

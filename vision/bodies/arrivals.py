@@ -26,7 +26,7 @@ from vision.numerics.relative_pose import NEAREST_M, Row, coordinate_m, relative
 
 # Every second view at 30 frames a second is kept. A look back takes the view closest to the wanted time.
 _KEEP_EVERY_S = 0.06
-# Views are kept for so long. Until then, the surface of something that has come to rest may count as arrived.
+# Time for which views are kept. So long may the surface of something that has come to rest count as arrived.
 ARRIVED_UP_TO_S = 0.9
 _OLDEST = 1.5  # of the wanted time of a look back: an older view does not serve
 # In the longer time, 0.6 s, a walking person moves by more than his own width. In the shorter time less error

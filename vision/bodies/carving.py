@@ -31,7 +31,7 @@ from vision.bodies.judgement import IMPLAUSIBLE_SPEED_FACTOR
 from vision.bodies.tracks import Tracks
 from vision.depth import connected, regions
 from vision.depth.connected import IntGrid
-from vision.depth.depth_grid import BoolGrid
+from vision.depth.depth_grid import BoolGrid, DepthGrid
 from vision.depth.depth_noise import depth_sigma_m, depth_sigma_of
 from vision.depth.regions import Regions
 from vision.detection import Detection
@@ -66,7 +66,6 @@ def carve(
     """
     if len(tracks) == 0:
         return labels
-    grid = detection.grid
     suspicious = candidates.moving_candidates(detection.motion, detection.age_frames).nonzero()[0]
     if len(suspicious) == 0 and not arrived.any():
         return labels
@@ -94,18 +93,22 @@ def carve(
     grown: BoolGrid = np.asarray(widened, np.uint8).view(np.bool_) & inside
     if np.count_nonzero(grown) < MIN_CELLS:
         return labels
-    count, parts = connected.components(grid, grown)
-    cells = np.bincount(parts.ravel(), minlength=count + 1)
-    keep = (cells[1:] >= MIN_CELLS).nonzero()[0] + 1
-    if len(keep) == 0:
+    suspects, count = _large_components(detection.grid, grown)
+    if count == 0:
         return labels
-    number = np.zeros(count + 1, np.int32)
-    number[keep] = np.arange(1, len(keep) + 1)
-    own = number.take(parts)
-    suspects = regions.measure(grid, own, len(keep))
     first = len(tracks)
-    _start(tracks, detection, suspects, SUSPECT_EVIDENCE, config)
-    return np.where(own > 0, own + first, labels).astype(np.int32)
+    _start(tracks, detection, regions.measure(detection.grid, suspects, count), SUSPECT_EVIDENCE, config)
+    return np.where(suspects > 0, suspects + first, labels).astype(np.int32)
+
+
+def _large_components(grid: DepthGrid, cells: BoolGrid) -> tuple[IntGrid, int]:
+    """Connected components of cells (h, w) with at least MIN_CELLS, labelled from 1; and their number."""
+    count, parts = connected.components(grid, cells)
+    sizes = np.bincount(parts.ravel(), minlength=count + 1)
+    large = (sizes[1:] >= MIN_CELLS).nonzero()[0] + 1
+    number = np.zeros(count + 1, np.int32)
+    number[large] = np.arange(1, len(large) + 1)
+    return number.take(parts), len(large)
 
 
 @compiled("boolean[:], boolean[:], boolean[:], float64[:, :], float64[:, :], float64, float64")

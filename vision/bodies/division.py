@@ -33,10 +33,10 @@ _STANDING = 0.5
 SEEN_THROUGH_HEIGHT = 0.5
 _DIP_M = 0.15  # minimum depth of the dip between two heads; a shoulder is lower still
 # Shape of a head: a load is wider; a post is narrower and has no shoulders.
-_HEAD_M = 0.15  # its width is measured so far below its top
+_HEAD_M = 0.15  # its width is measured this far below its top
 _MIN_HEAD_M = 0.13  # minimum width; the shoulders are wider than the head by this as well
 _MAX_HEAD_M = 0.30  # maximum width
-_SHOULDERS_M = 0.36  # the width of the shoulders is measured so far below the top
+_SHOULDERS_M = 0.36  # the width of the shoulders is measured this far below the top
 _MIN_APART_M = 0.35  # minimum distance of two heads
 _MAX_APART_M = 0.8  # maximum distance: people farther apart leave a valley
 # Share of the image between two groups: if less shows something farther, nothing is seen there.

@@ -16,7 +16,7 @@ from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import BoolGrid, DepthGrid, FloatGrid, nearest_cell
 
 _AROUND_M = 0.2  # cells within this distance belong to the fragment's body, which is about twice as wide
-# Gate on depth: the depth of a body, plus so many sigmas, as far as these grow with the square of the depth.
+# Gate on depth: the depth of a body, plus this many sigmas of the noise that grows with the squared depth.
 _AGREE_M = 0.3
 _AGREE_SIGMAS = 2.0
 

@@ -16,7 +16,7 @@ from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import DepthGrid, FloatGrid
 from vision.depth.regions import Regions, exchanged, measure
 
-# Gate on depth: the depth of a body, plus so many sigmas, as far as these grow with the square of the depth.
+# Gate on depth: the depth of a body, plus this many sigmas of the noise that grows with the squared depth.
 _SAME_M = 0.3
 _SAME_SIGMAS = 2.0
 _MIN_GAIN_M = 0.2  # minimum gain in height: less is only the rim of the cells that were found already

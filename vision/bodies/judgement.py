@@ -1,20 +1,20 @@
 """The verdict moving or static for each track, with hysteresis, from several kinds of proof.
 
-Kinds of proof in one frame, each of them a rule of vision/bodies/proof.py (threshold: settings.sigmas
+Kinds of proof in one frame, each a rule of vision/bodies/proof_rules.py (threshold: settings.sigmas
 squared; ends: end points of the track's fragments):
 
-* Fragments (_by_fragments): the velocity over ground, both filtered and by this frame's fragments alone,
+* Fragments (by_fragments): the velocity over ground, both filtered and by this frame's fragments alone,
   clearly differs from zero. For level motion across the line of sight, 4 agreeing ends suffice. Along the
   line of sight 8 are needed, since a few sliding ends look like a change of length. The surface must not
   contradict (across the line of sight, 8 ends overrule it). Where the surface confirms the velocity, 0.55 of
   the threshold suffices.
-* Unrest (_by_unrest): of 8 ends or more, at least 70 % contradict standing still, though they may agree on
+* Unrest (by_unrest): of 8 ends or more, at least 70 % contradict standing still, though they may agree on
   no common velocity, as the ends on limbs. The filtered velocity needs to exceed half of the threshold only,
   after 0.4 s a quarter.
-* Arrival (_by_arrival): part of the surface is where free space was seen. Half of the threshold suffices.
+* Arrival (by_arrival): part of the surface is where free space was seen. Half of the threshold suffices.
   Where much of the surface has arrived, or some of it in each of several frames, that alone is proof, except
   for what has just stopped.
-* Surface (_by_surface): the centre of a whole, compact surface moves for longer and more clearly than a
+* Surface (by_surface): the centre of a whole, compact surface moves for longer and more clearly than a
   change of viewpoint or a growing surface explains.
 
 All kinds need a known motion of the camera and, except for much arrival, more than the minimum speed. Bodies

@@ -48,7 +48,7 @@ _NOT_VISIBLE, _WHOLE, _PARTIAL, _POSITION_ONLY, _NEARLY_HIDDEN = range(5)
 
 def update_from_surfaces(tracks: Tracks, detection: Detection, measured: Regions, noise: DepthNoise) -> None:
     """Update tracks with the surfaces measured, entry k for track k; one without cells stays predicted."""
-    dt_s, rotation = detection.dt_s, detection.pose.rotation
+    rotation = detection.pose.rotation
     kind, centre_m, change, tracks.area_m2 = _kinds(
         measured.cells,
         measured.position_m,
@@ -60,12 +60,11 @@ def update_from_surfaces(tracks: Tracks, detection: Detection, measured: Regions
         tracks.area_m2,
         tracks.moving,
         detection.motion_known,
-        -math.expm1(-dt_s / _AREA_MEMORY_S),
+        -math.expm1(-detection.dt_s / _AREA_MEMORY_S),
         noise.floor_m,
         noise.quadratic_per_m,
     )
-    visible, smooth, nearly_hidden = kind != _NOT_VISIBLE, kind == _WHOLE, kind == _NEARLY_HIDDEN
-    centre_covariance = _centre_covariances(
+    covariance = _centre_covariances(
         kind,
         measured.position_m,
         measured.extent_m,
@@ -74,25 +73,23 @@ def update_from_surfaces(tracks: Tracks, detection: Detection, measured: Regions
         noise.floor_m,
         noise.quadratic_per_m,
     )
-    measured_centre, position_only = (
-        (smooth | (kind == _PARTIAL)).nonzero()[0],
-        (kind == _POSITION_ONLY).nonzero()[0],
-    )
-    tracks.update_with_centre(
-        measured_centre,
-        centre_m.take(measured_centre, axis=0),
-        centre_covariance.take(measured_centre, axis=0),
-    )
-    tracks.reset_position(
-        position_only, centre_m.take(position_only, axis=0), centre_covariance.take(position_only, axis=0)
-    )
-    whole = measured.whole
+    centred = ((kind == _WHOLE) | (kind == _PARTIAL)).nonzero()[0]
+    tracks.update_with_centre(centred, centre_m.take(centred, axis=0), covariance.take(centred, axis=0))
+    placed = (kind == _POSITION_ONLY).nonzero()[0]
+    tracks.reset_position(placed, centre_m.take(placed, axis=0), covariance.take(placed, axis=0))
+    growth_mps = change * measured.extent_m[:, 0] / _AREA_MEMORY_S
+    tracks.growth_mps = np.where(kind != _NOT_VISIBLE, growth_mps, tracks.growth_mps)
+    _note_view(tracks, detection, measured, kind)
+
+
+def _note_view(tracks: Tracks, detection: Detection, measured: Regions, kind: NDArray[np.intp]) -> None:
+    """Note in tracks how each is visible in this frame: since when, how large, and how much of it."""
+    visible, nearly_hidden, whole = kind != _NOT_VISIBLE, kind == _NEARLY_HIDDEN, measured.whole
     tracks.nearly_hidden = np.where(
         visible, nearly_hidden & ~_at_border(measured.bbox_px, detection), tracks.nearly_hidden
     )
-    tracks.velocity_measured_s = np.where(smooth & whole, tracks.velocity_measured_s + dt_s, 0.0)
-    growth_mps = change * measured.extent_m[:, 0] / _AREA_MEMORY_S
-    tracks.growth_mps = np.where(visible, growth_mps, tracks.growth_mps)
+    moved_s = tracks.velocity_measured_s + detection.dt_s
+    tracks.velocity_measured_s = np.where((kind == _WHOLE) & whole, moved_s, 0.0)
     tracks.seen_ns[visible] = detection.captured_ns
     tracks.sightings += visible
     box_is_whole = visible & ((whole & ~nearly_hidden) | (tracks.sightings == 1))

@@ -4,6 +4,7 @@ Files, in the order in which they come into play within one frame:
 
 * gyro - samples of the gyro, and the rotation between two frames.
 * floor - finds the floor in the depth, for a camera without a known mounting.
+* frozen_depth - whether depth repeats while the camera moves; used by health.
 * health - how far a frame can be trusted.
 * mount_check - whether the floor is where the mounting puts it.
 * lens - pixels to rays, rotation vectors; used throughout.

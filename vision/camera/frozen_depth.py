@@ -13,10 +13,10 @@ from hal.compiled import compiled
 from hal.types import DepthImage, Pose
 from vision.fragments.edges import GreyImage
 
-_STEP = 16  # every so many pixels a sample, as in vision/camera/health.py
+_STEP = 16  # pixels between two samples, as in vision/camera/health.py
 _REPETITIONS = 3  # in a row: depth at a third of colour's rate repeats twice
 _CHANGED_LEVEL = 12  # grey: four sigmas of a sensor's noise in good light; in the dark noise may do, too
-_CHANGED_SHARE = 0.01  # of the samples: somebody who is 8 m away is some 3 %
+_CHANGED_SHARE = 0.01  # of the samples: a person 8 m away covers some 3 %
 _MOVED_M = 0.01
 _TURNED_RAD = 0.005
 

@@ -1,7 +1,11 @@
-"""How far a frame can be trusted: fail closed, with a plain sentence."""
+"""Camera health: whether a frame can be trusted, and if not, why, in a plain sentence.
+
+vision/detector.py asks before it tracks anything in the frame. In doubt a frame is not trusted.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum
 
@@ -15,14 +19,17 @@ from vision.depth.depth_grid import DepthGrid
 from vision.fragments.edges import GreyImage
 from vision.scene import CameraCondition, CameraHealth
 
-_STEP = 16  # every so many pixels a sample: 1200 of 640x480 are enough for shares
+_STEP = 16  # pixels between two samples: 1200 samples of 640x480 are enough for shares
 _BLACK_LEVEL = 12  # grey: black, with room for a sensor's noise
 _WHITE_LEVEL = 243  # grey: as far from white as that from black
 _BAD_SHARE = 0.9  # of the image: a lamp or a dark hall is less
 _MIN_DEPTH_SHARE = 0.02  # of the grid: what is left is stray cells
 _POOR_DEPTH_SHARE = 0.25  # of the grid: most of the view is dark, glass or too near
-_FROZEN_FRAMES = 2  # repetitions in a row; a single one is left out and not complained of
-_STEPPED_FRAMES = 3  # so many in a row from before, in order, and it is time itself that has gone back
+_FROZEN_FRAMES = 2  # successive repetitions; a single one is left out without a complaint
+_STEPPED_FRAMES = 3  # this many old frames in order show that time itself has gone back
+
+_BAD, _POOR = CameraCondition.UNTRUSTWORTHY, CameraCondition.DEGRADED
+_Problem = tuple[CameraCondition, str]
 
 
 class Continuity(Enum):
@@ -64,44 +71,23 @@ class HealthMonitor:
         """The worst finding decides the condition; each finding has its sentence. odometry: of the camera."""
         dark, bright, alike = _samples(grey, self._last_grey)
         continuity, gap_s = self._continuity(frame)
-        problems: list[tuple[CameraCondition, str]] = []
-        bad, poor = CameraCondition.UNTRUSTWORTHY, CameraCondition.DEGRADED
-        if continuity is Continuity.BACKWARD:
-            problems.append((bad, f"frame is {-gap_s:.3f} s older than the one before"))
-        elif continuity is Continuity.STEPPED:
-            problems.append((bad, f"time has gone back by {-gap_s:.3f} s: everything begins anew"))
-        elif continuity is Continuity.REPEATED:
-            problems.append((bad, "frame has the time of the one before: it is a repetition"))
-        elif continuity is Continuity.GAP:
-            problems.append((poor, f"{gap_s:.2f} s without a frame: motion cannot be compared across it"))
-        # Colour alone: a sensor's noise never repeats, whatever depth does beside it (frozen_depth.py).
-        # Hardly any gets past the comparison of samples.
+        # Colour alone: a sensor's noise never repeats, also where depth does (frozen_depth.py). The
+        # comparison of samples is quick, and hardly any image that has changed passes it.
         repeated = alike and bool((self._last_grey == grey).all())
         self._same = self._same + 1 if repeated else 0
-        if self._same >= _FROZEN_FRAMES:
-            problems.append((bad, f"image has not changed by a single grey level for {self._same} frames"))
-        frozen = self._frozen_depth.step(frame.depth, grey, odometry, repeated)
-        usable_colour = max(dark, bright) < _BAD_SHARE
-        if dark >= _BAD_SHARE:
-            problems.append((bad, f"{dark:.0%} of the colour image is black: is the lens covered?"))
-        elif bright >= _BAD_SHARE:
-            problems.append((bad, f"{bright:.0%} of the colour image is saturated"))
-        # What is beyond the depth mask was measured, too, but tells of nothing that could be touched.
-        near_share = float(np.count_nonzero(grid.valid)) / grid.valid.size
-        share = near_share + float(np.count_nonzero(grid.beyond)) / grid.beyond.size
-        usable_depth = near_share >= _MIN_DEPTH_SHARE
-        if not usable_depth:
-            within = f"data nearer than {grid.range_m:.3g} m"
-            problems.append((bad, f"only {near_share:.1%} of the depth image holds {within}"))
-        elif share < _POOR_DEPTH_SHARE:
-            problems.append((poor, f"only {share:.0%} of the depth image holds data"))
-        if usable_depth and frozen:
-            problems.append((bad, f"depth has not changed by a single unit for {frozen} frames of motion"))
+        frozen_frames = self._frozen_depth.step(frame.depth, grey, odometry, repeated)
+        usable_depth, share, depth_problems = _depth_findings(grid, frozen_frames)
+        problems = [
+            *_time_problems(continuity, gap_s),
+            *_colour_problems(self._same, dark, bright),
+            *depth_problems,
+        ]
         if continuity is not Continuity.BACKWARD:
             self._last_ns = frame.captured_ns
             self._last_grey = grey
         if repeated and continuity is Continuity.NEXT:
             continuity = Continuity.REPEATED
+        usable_colour = max(dark, bright) < _BAD_SHARE
         return FrameCheck(usable_colour, usable_depth, continuity, _verdict(problems, share))
 
     def _continuity(self, frame: RgbdFrame) -> tuple[Continuity, float]:
@@ -116,7 +102,7 @@ class HealthMonitor:
         return (Continuity.GAP if gap_s > self._config.max_gap_s else Continuity.NEXT), gap_s
 
     def _backward(self, captured_ns: int) -> Continuity:
-        """A frame from before the last one: late, or one of several that follow each other from there on."""
+        """Classify a frame older than the last one: late, or one of a series after time has stepped back."""
         earlier_ns, self._earlier_ns = self._earlier_ns, captured_ns
         follows = earlier_ns is not None and 0 < captured_ns - earlier_ns <= self._config.max_gap_s * 1e9
         self._earlier_frames = self._earlier_frames + 1 if follows else 1
@@ -126,10 +112,53 @@ class HealthMonitor:
         return Continuity.STEPPED
 
 
+def _time_problems(continuity: Continuity, gap_s: float) -> Iterator[_Problem]:
+    """What is wrong with the time of a frame, gap_s after the one before."""
+    match continuity:
+        case Continuity.BACKWARD:
+            yield _BAD, f"frame is {-gap_s:.3f} s older than the one before"
+        case Continuity.STEPPED:
+            yield _BAD, f"time has gone back by {-gap_s:.3f} s: everything begins anew"
+        case Continuity.REPEATED:
+            yield _BAD, "frame has the time of the one before: it is a repetition"
+        case Continuity.GAP:
+            yield _POOR, f"{gap_s:.2f} s without a frame: motion cannot be compared across it"
+
+
+def _colour_problems(same_frames: int, dark: float, bright: float) -> Iterator[_Problem]:
+    """What is wrong with the colour image: frozen, dark or saturated. dark, bright: shares of the image."""
+    if same_frames >= _FROZEN_FRAMES:
+        yield _BAD, f"image has not changed by a single grey level for {same_frames} frames"
+    if dark >= _BAD_SHARE:
+        yield _BAD, f"{dark:.0%} of the colour image is black: is the lens covered?"
+    elif bright >= _BAD_SHARE:
+        yield _BAD, f"{bright:.0%} of the colour image is saturated"
+
+
+def _depth_findings(grid: DepthGrid, frozen_frames: int) -> tuple[bool, float, list[_Problem]]:
+    """Whether depth is usable, which share of it holds data, and what is wrong with it."""
+    # Depth beyond the mask counts as measured, but shows nothing that could be touched.
+    near_share = float(np.count_nonzero(grid.valid)) / grid.valid.size
+    share = near_share + float(np.count_nonzero(grid.beyond)) / grid.beyond.size
+    usable, problems = near_share >= _MIN_DEPTH_SHARE, list[_Problem]()
+    if not usable:
+        within = f"data nearer than {grid.range_m:.3g} m"
+        problems.append((_BAD, f"only {near_share:.1%} of the depth image holds {within}"))
+    elif share < _POOR_DEPTH_SHARE:
+        problems.append((_POOR, f"only {share:.0%} of the depth image holds data"))
+    if usable and frozen_frames:
+        problems.append(
+            (_BAD, f"depth has not changed by a single unit for {frozen_frames} frames of motion")
+        )
+    return usable, share, problems
+
+
 @compiled("uint8[:, ::1], uint8[:, ::1]")
 def _samples(grey: GreyImage, before: GreyImage) -> tuple[float, float, bool]:
-    """Which share of an image's samples is black, which is white, and whether they are those of the image
-    before; of another size it is not."""
+    """Shares of an image's samples that are black and white, and whether all are as in the image before.
+
+    An image of another size is not alike.
+    """
     height, width = grey.shape
     black, white, size, alike = 0, 0, 0, grey.shape == before.shape
     for i in range(_STEP // 2, height, _STEP):
@@ -147,7 +176,7 @@ def worsened(health: CameraHealth, condition: CameraCondition, reason: str) -> C
     return _verdict([*present, (condition, reason)], health.valid_depth_ratio)
 
 
-def _verdict(problems: list[tuple[CameraCondition, str]], share: float) -> CameraHealth:
+def _verdict(problems: list[_Problem], share: float) -> CameraHealth:
     conditions = [condition for condition, _ in problems]
     if CameraCondition.UNTRUSTWORTHY in conditions:
         condition = CameraCondition.UNTRUSTWORTHY

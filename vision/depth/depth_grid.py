@@ -7,14 +7,14 @@ of pixels, smoothed by a median over 5x5 cells.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from config.perception import PerceptionConfig
+from config.perception import DepthNoise, PerceptionConfig
 from hal.compiled import compiled, inlined
 from hal.types import CameraMount, DepthImage, FloatArray, Intrinsics, RgbdFrame
 from vision.depth.depth_mask import measurable_m
@@ -107,51 +107,44 @@ def make_grid(frame: RgbdFrame, config: PerceptionConfig, mount: CameraMount | N
     middle = np.asarray(cv2.medianBlur(raw, 5), np.uint16)
     inverse, depth_m = _smoothed(raw, middle, scale_m)
     view = _view(frame.intrinsics, mount, depth_m.shape, step, offset)
-    x, y = view.x, view.y
-    if mount is None:
-        nan = float("nan")
-        return DepthGrid(
-            step_px=step,
-            offset_px=offset,
-            depth_m=depth_m,
-            inverse_depth=inverse,
-            valid=valid,
-            beyond=beyond,
-            x=x,
-            y=y,
-            forward_m=depth_m,
-            height_m=None,
-            height_sigma_m=None,
-            camera_height_m=nan,
-            pitch_rad=nan,
-            up=None,
-            range_m=range_m,
-        )
-    noise = config.depth_noise
-    forward_m, height_m, height_sigma_m = _over_floor(
-        depth_m,
-        view.ahead,
-        view.drop,
-        np.float32(mount.height_m),
-        np.float32(noise.floor_m),
-        np.float32(noise.quadratic_per_m),
-    )
-    return DepthGrid(
+    grid = DepthGrid(
         step_px=step,
         offset_px=offset,
         depth_m=depth_m,
         inverse_depth=inverse,
         valid=valid,
         beyond=beyond,
-        x=x,
-        y=y,
+        x=view.x,
+        y=view.y,
+        forward_m=depth_m,
+        height_m=None,
+        height_sigma_m=None,
+        camera_height_m=math.nan,
+        pitch_rad=math.nan,
+        up=None,
+        range_m=range_m,
+    )
+    return grid if mount is None else _with_floor(grid, view, mount, config.depth_noise)
+
+
+def _with_floor(grid: DepthGrid, view: _View, mount: CameraMount, noise: DepthNoise) -> DepthGrid:
+    """grid with its distances along the floor and its heights over it."""
+    forward_m, height_m, height_sigma_m = _over_floor(
+        grid.depth_m,
+        view.ahead,
+        view.drop,
+        np.float32(mount.height_m),
+        np.float32(noise.floor_m),
+        np.float32(noise.quadratic_per_m),
+    )
+    return replace(
+        grid,
         forward_m=forward_m,
         height_m=height_m,
         height_sigma_m=height_sigma_m,
         camera_height_m=mount.height_m,
         pitch_rad=mount.pitch_rad,
         up=np.array([0.0, -math.cos(mount.pitch_rad), -math.sin(mount.pitch_rad)]),
-        range_m=range_m,
     )
 
 

@@ -76,7 +76,7 @@ def _bands(
         if off > _FAN_BANDS * 2.0 * half_width:
             edge = middle[0] - half_width
             band = np.floor((x / ahead - edge) / (2.0 * half_width)).clip(0, bands - 1)
-            # So many that no cell is left out in the row with the largest ahead, where a band is widest.
+            # Wide enough that no cell is left out in the row with the largest ahead, where a band is widest.
             width = math.ceil(2.0 * half_width * float(ahead.max()) / step)
             along = edge + 2.0 * half_width / width * (np.arange(bands * width) + 0.5)
             nearest = np.rint((along * ahead - x0) / step).astype(np.intp)

@@ -6,6 +6,7 @@ region): vision/__init__.py.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +16,9 @@ from hal.compiled import compiled, inlined
 from hal.types import FloatArray
 from vision.depth.connected import MAX_JUMP, MIN_JUMP, IntGrid
 from vision.depth.depth_grid import DepthGrid, FloatGrid
+
+Counts = NDArray[np.intp]
+Flags = NDArray[np.bool_]
 
 _UNIFORM = 3.46  # the length of a uniform distribution in standard deviations: square root of 12
 # A part this close to the floor, in metres and per metre of depth, stands on it: the lowest part of a body is
@@ -41,22 +45,22 @@ class Regions:
     overlapped: something nearer begins at its left or right rim, (R,).
     """
 
-    cells: NDArray[np.intp]
-    rows: NDArray[np.intp]
+    cells: Counts
+    rows: Counts
     bbox_px: FloatArray
     position_m: FloatArray
     extent_m: FloatArray
-    sides_visible: NDArray[np.bool_]
-    top_and_bottom_visible: NDArray[np.bool_]
-    overlapped: NDArray[np.bool_]
+    sides_visible: Flags
+    top_and_bottom_visible: Flags
+    overlapped: Flags
 
     @property
-    def whole(self) -> NDArray[np.bool_]:
+    def whole(self) -> Flags:
         """(R,) parts that are cut on no side and not hidden in part by something nearer."""
         return self.sides_visible & self.top_and_bottom_visible & ~self.overlapped
 
 
-def exchanged(regions: Regions, others: Regions, chosen: NDArray[np.bool_]) -> Regions:
+def exchanged(regions: Regions, others: Regions, chosen: Flags) -> Regions:
     """regions with the chosen (R,) entries taken from others."""
     return Regions(
         cells=np.where(chosen, others.cells, regions.cells),
@@ -96,7 +100,7 @@ def measure(grid: DepthGrid, labels: IntGrid, count: int) -> Regions:
 
 
 @inlined
-def _edges(labels: IntGrid, count: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _edges(labels: IntGrid, count: int) -> tuple[Counts, Counts]:
     """(R,) number of cells of parts 1..count of labels (h, w), and (R, 4) their left, top, right, bottom.
 
     These are columns and rows of the grid; 0, 0, 0, -1 for parts without cells.
@@ -141,39 +145,17 @@ def _foot_px(
     return min(row, offset_px + (len(y) - 0.5) * step_px)
 
 
-@compiled(
-    "float32[:, ::1], int32[:, ::1], int64, float32[::1], float32[::1], "
-    "float64, float64, float64[::1], float64"
-)
-def _measured(
-    inverse: FloatGrid,
-    labels: IntGrid,
-    count: int,
-    x: FloatGrid,
-    y: FloatGrid,
-    step_px: float,
-    offset_px: float,
-    up: FloatArray,
-    height_m: float,
-) -> tuple[
-    NDArray[np.intp],
-    NDArray[np.intp],
-    FloatArray,
-    FloatArray,
-    FloatArray,
-    NDArray[np.bool_],
-    NDArray[np.bool_],
-]:
-    """cells and rows (R,), bbox_px (R, 4), position_m and extent_m (R, 3), sides_visible and
-    top_and_bottom_visible (R,) of the parts.
+@inlined
+def _sums(
+    inverse: FloatGrid, labels: IntGrid, x: FloatGrid, y: FloatGrid, edges: Counts
+) -> tuple[FloatArray, FloatArray]:
+    """Sums over each part with edges (R, 4), (R, 4): inverse depth, its square, x, y.
 
-    height_m: of the camera, NaN where the floor is not known. up (3,): the floor's normal.
+    And sums over its left and over its right rim, (R, 4): cells, inverse depth. The width is measured with
+    each rim at its own depth, since a body seen along one of its sides would seem too wide at the depth of
+    its middle.
     """
-    (cells, edges), rows = _edges(labels, count), np.zeros(count, np.intp)
-    sides_visible, top_and_bottom_visible = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
-    # Sums over each part: inverse depth, its square, x, y. Sums over its left and over its right rim: cells,
-    # inverse depth. The width is measured with each rim at its own depth, since a body seen along one of its
-    # sides would seem too wide at the depth of its middle.
+    count = len(edges)
     sums, rims = np.zeros((count, 4)), np.zeros((count, 4))
     for i in range(labels.shape[0]):
         for j in range(labels.shape[1]):
@@ -192,6 +174,32 @@ def _measured(
             if j >= right - rim:
                 rims[part, 2] += 1.0
                 rims[part, 3] += value
+    return sums, rims
+
+
+@compiled(
+    "float32[:, ::1], int32[:, ::1], int64, float32[::1], float32[::1], "
+    "float64, float64, float64[::1], float64"
+)
+def _measured(
+    inverse: FloatGrid,
+    labels: IntGrid,
+    count: int,
+    x: FloatGrid,
+    y: FloatGrid,
+    step_px: float,
+    offset_px: float,
+    up: FloatArray,
+    height_m: float,
+) -> tuple[Counts, Counts, FloatArray, FloatArray, FloatArray, Flags, Flags]:
+    """cells and rows (R,), bbox_px (R, 4), position_m and extent_m (R, 3), sides_visible and
+    top_and_bottom_visible (R,) of the parts.
+
+    height_m: of the camera, NaN where the floor is not known. up (3,): the floor's normal.
+    """
+    (cells, edges), rows = _edges(labels, count), np.zeros(count, np.intp)
+    sides_visible, top_and_bottom_visible = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
+    sums, rims = _sums(inverse, labels, x, y, edges)
     bbox_px, position_m, extent_m = np.zeros((count, 4)), np.zeros((count, 3)), np.zeros((count, 3))
     for part in range(count):
         if cells[part] == 0:
@@ -206,7 +214,7 @@ def _measured(
         bbox_px[part, 1] = top * step_px + (offset_px - 0.5 * step_px)
         bbox_px[part, 2] = right * step_px + (offset_px + 0.5 * step_px)
         bbox_px[part, 3] = bottom * step_px + (offset_px + 0.5 * step_px)
-        if height_m == height_m:
+        if not math.isnan(height_m):
             foot_px = _foot_px(y, step_px, offset_px, up, height_m, mean_x, depth_m, bottom)
             bbox_px[part, 3] = max(bbox_px[part, 3], foot_px)
         position_m[part] = mean_x * depth_m, mean_y * depth_m, depth_m
@@ -234,9 +242,7 @@ def with_occlusion(grid: DepthGrid, labels: IntGrid, regions: Regions) -> Region
 
 
 @compiled("float32[:, ::1], int32[:, ::1], int64, float32")
-def _hidden_cells(
-    inverse: FloatGrid, labels: IntGrid, count: int, jump: np.float32
-) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _hidden_cells(inverse: FloatGrid, labels: IntGrid, count: int, jump: np.float32) -> tuple[Counts, Counts]:
     """Two counts of rim cells of each part, (count,) each.
 
     The first: cells at the left or right rim beside which there is something nearer, or another part at the
@@ -268,7 +274,7 @@ def _hidden_cells(
     return hidden[1 : count + 1].copy(), overlapped[1 : count + 1].copy()
 
 
-def hidden_below(grid: DepthGrid, labels: IntGrid, regions: Regions) -> NDArray[np.bool_]:
+def hidden_below(grid: DepthGrid, labels: IntGrid, regions: Regions) -> Flags:
     """(R,) parts of at least _HEAD_M height whose lower end is hidden over at least half of their width.
 
     How far down they reach is not known. Below the lower end of a beam, in contrast, something farther is
@@ -284,5 +290,5 @@ def hidden_below(grid: DepthGrid, labels: IntGrid, regions: Regions) -> NDArray[
     cells = np.bincount(flat.take(rims[nearer]), minlength=len(regions.cells) + 1)[1:]
     across = (regions.bbox_px[:, 2] - regions.bbox_px[:, 0]) / grid.step_px
     tall = regions.extent_m[:, 1] >= _HEAD_M
-    result: NDArray[np.bool_] = tall & (regions.cells > 0) & (cells >= _HIDDEN_SHARE * across)
+    result: Flags = tall & (regions.cells > 0) & (cells >= _HIDDEN_SHARE * across)
     return result

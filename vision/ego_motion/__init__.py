@@ -4,6 +4,7 @@ Files, in the order in which they come into play:
 
 * motion_prior - the prior of the motion, from odometry, a gyro, or the motion before.
 * reprojection - anchored points, and where they are seen now.
+* pose_arrays - poses as arrays, moved and compared in compiled steps.
 * robust_fit - robust Gauss-Newton on the reprojection error.
 * camera_motion - the estimate: gates, the conflict with the prior, the covariance.
 * rolling_shutter - correction of pixels for the sweep; learns the read-out time.

@@ -31,7 +31,7 @@ import numpy as np
 
 from hal.types import FloatArray, Intrinsics, Pose
 from vision.ego_motion.motion_prior import MotionPrior, SweepPrior
-from vision.ego_motion.reprojection import Anchors, view_of
+from vision.ego_motion.reprojection import Anchors, View, view_of
 from vision.ego_motion.robust_fit import Fit, fit
 
 _MIN_POINTS = 8  # with two equations each: twice as many as unknowns
@@ -43,7 +43,7 @@ _YAW_AND_TRANSLATION = np.array([1, 3, 4, 5])  # the unknowns that are compared 
 _CONFLICT_CHI2 = 13.3  # 99 %, 4 degrees of freedom
 _TRUSTED_SHARE = np.array([1.0, 0.3, 1.0, 0.2, 0.2, 0.2, 1.0, 1.0])  # of the prior's sigma, tightened
 _BENT_CHI2 = 16.0  # four sigmas: the image alone shows another sweep than the fit
-_STRAIGHTENED_SHARE = 0.05  # of the points: so many more inliers are needed to accept the larger sweep
+_STRAIGHTENED_SHARE = 0.05  # of the points: minimum of additional inliers to accept the larger sweep
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,20 +82,11 @@ def estimate(
 
     before: pose of the camera in the frame before, in the fixed frame. sweep: prior of the sweep.
     """
-    start, sigma = before @ prior.motion, np.concatenate((prior.sigma, sweep.sigma_rad))
-    use = anchors.usable.nonzero()[0]
+    start, use = before @ prior.motion, anchors.usable.nonzero()[0]
     if len(use) < _MIN_POINTS:
-        return _prior_only(start, sigma, float("nan"))
+        return _prior_only(start, np.concatenate((prior.sigma, sweep.sigma_rad)), float("nan"))
     view = view_of(anchors, pixels, use, camera)
-    found = fit(view, start, sigma)
-    bend_rad, bend_variance = _bend(found)
-    if (np.square(bend_rad - found.sweep_rad) > _BENT_CHI2 * bend_variance).any():
-        # Before the read-out time is known, a larger sweep than is certain may be plain in the image.
-        possible = np.concatenate((prior.sigma, sweep.max_rad))
-        straightened = fit(view, start, possible)
-        if straightened.inliers >= found.inliers + _STRAIGHTENED_SHARE * len(use):
-            found, sigma = straightened, possible
-            bend_rad, bend_variance = _bend(found)
+    found, sigma, bend = _fit_with_sweep(view, start, prior, sweep)
     least = max(_MIN_POINTS, _MIN_INLIER_RATIO * len(use))
     conflicts = prior.trusted and _conflict(found, prior.sigma)
     disputed = False
@@ -111,7 +102,7 @@ def estimate(
             least = max(_MIN_POINTS, _MIN_BACKGROUND_RATIO * len(use))
             # If it is still far from the prior, too little of the ground is in view to correct the prior.
             conflicts = _conflict(found, prior.sigma)
-        bend_rad, bend_variance = _bend(found)
+        bend = _bend(found)
     ratio = found.inliers / len(use)
     # Without an inverse OpenCV returns zeros, which would mean perfect knowledge: check regular below.
     regular, covariance = cv2.invert(found.information, flags=cv2.DECOMP_CHOLESKY)
@@ -121,13 +112,32 @@ def estimate(
     return CameraEstimate(
         pose=found.pose,
         sweep_rad=found.sweep_rad,
-        bend_rad=bend_rad,
-        bend_variance=bend_variance,
+        bend_rad=bend[0],
+        bend_variance=bend[1],
         covariance=spread,
         inlier_ratio=ratio,
         visual=not disputed,
         disputed=disputed,
     )
+
+
+def _fit_with_sweep(
+    view: View, start: Pose, prior: MotionPrior, sweep: SweepPrior
+) -> tuple[Fit, FloatArray, tuple[FloatArray, FloatArray]]:
+    """The fit with the prior of the sweep that explains more, the sigma (8,) of its prior, and its _bend.
+
+    Before the read-out time is known, the sweep may be larger than its prior admits, which then shows in the
+    image.
+    """
+    sigma = np.concatenate((prior.sigma, sweep.sigma_rad))
+    found = fit(view, start, sigma)
+    bend = bend_rad, bend_variance = _bend(found)
+    if (np.square(bend_rad - found.sweep_rad) > _BENT_CHI2 * bend_variance).any():
+        possible = np.concatenate((prior.sigma, sweep.max_rad))
+        straightened = fit(view, start, possible)
+        if straightened.inliers >= found.inliers + _STRAIGHTENED_SHARE * len(view.seen):
+            return straightened, possible, _bend(straightened)
+    return found, sigma, bend
 
 
 def _prior_only(start: Pose, sigma: FloatArray, inlier_ratio: float) -> CameraEstimate:

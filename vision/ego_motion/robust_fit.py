@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from hal.compiled import compiled, inlined
 from hal.types import FloatArray, Pose
+from vision.ego_motion.pose_arrays import back_to, in_camera, moved, turned_back
 from vision.ego_motion.reprojection import View
 
 _GATE_CHI2 = 9.21  # 99 % of static points, 2 degrees of freedom
@@ -73,71 +74,16 @@ def fit(view: View, start: Pose, sigma: FloatArray) -> Fit:
 
 
 @inlined
-def _moved(pose: FloatArray, step: FloatArray) -> FloatArray:
-    """A pose (3, 4), rotation and translation, after a small motion step (6,) in its own axes."""
-    x, y, z = step[0], step[1], step[2]
-    angle = math.sqrt(x * x + y * y + z * z)
-    result = pose.copy()
-    for i in range(3):
-        result[i, 3] += pose[i, 0] * step[3] + pose[i, 1] * step[4] + pose[i, 2] * step[5]
-    if angle < 1e-15:
-        return result
-    # Rodrigues' formula.
-    x, y, z, sine, cosine = x / angle, y / angle, z / angle, math.sin(angle), math.cos(angle)
-    rest = 1.0 - cosine
-    for i in range(3):
-        a, b, c = pose[i, 0], pose[i, 1], pose[i, 2]
-        along = rest * (a * x + b * y + c * z)
-        result[i, 0] = cosine * a + along * x + sine * (b * z - c * y)
-        result[i, 1] = cosine * b + along * y + sine * (c * x - a * z)
-        result[i, 2] = cosine * c + along * z + sine * (a * y - b * x)
-    return result
-
-
-@inlined
-def _back(pose: FloatArray, start: FloatArray) -> FloatArray:
-    """(6,) the small motion of a pose (3, 4) that leads back to start (3, 4)."""
-    result, turn = np.zeros(6), np.zeros((3, 3))
-    for i in range(3):
-        for j in range(3):
-            result[3 + i] += pose[j, i] * (start[j, 3] - pose[j, 3])
-            for k in range(3):
-                turn[i, j] += pose[k, i] * start[k, j]
-    x, y, z = turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]
-    sine = 0.5 * math.sqrt(x * x + y * y + z * z)
-    angle = math.atan2(sine, 0.5 * (turn[0, 0] + turn[1, 1] + turn[2, 2] - 1.0))
-    scale = 0.5 if sine < 1e-9 else 0.5 * angle / sine
-    result[0], result[1], result[2] = x * scale, y * scale, z * scale
-    return result
-
-
-@inlined
-def _turned_back(pose: FloatArray, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """A vector of the fixed frame in the axes of the camera."""
-    return (
-        pose[0, 0] * x + pose[1, 0] * y + pose[2, 0] * z,
-        pose[0, 1] * x + pose[1, 1] * y + pose[2, 1] * z,
-        pose[0, 2] * x + pose[1, 2] * y + pose[2, 2] * z,
-    )
-
-
-@inlined
-def _in_camera(pose: FloatArray, point_m: FloatArray) -> tuple[float, float, float]:
-    """A point (3,) of the fixed frame in the camera frame."""
-    return _turned_back(pose, point_m[0] - pose[0, 3], point_m[1] - pose[1, 3], point_m[2] - pose[2, 3])
-
-
-@inlined
 def _shifted(lines: FloatArray, seen: FloatArray, start: FloatArray, sigma: FloatArray) -> FloatArray:
     """A better start pose: start rotated by the median residual of all points, by 3 sigma (8,) at most."""
     across, down, turn = np.empty(len(seen)), np.empty(len(seen)), np.zeros(6)
     for k in range(len(seen)):
-        x, y, z = _in_camera(start, lines[k, 0])
+        x, y, z = in_camera(start, lines[k, 0])
         ahead = max(z, _MIN_AHEAD_M)
         across[k], down[k] = seen[k, 0] - x / ahead, seen[k, 1] - y / ahead
     turn[0] = min(max(np.median(down), -3.0 * sigma[0]), 3.0 * sigma[0])
     turn[1] = min(max(-np.median(across), -3.0 * sigma[1]), 3.0 * sigma[1])
-    return _moved(start, turn)
+    return moved(start, turn)
 
 
 @inlined
@@ -147,16 +93,17 @@ def _linearised(
     """Linearise the residuals at a pose and sweep.
 
     table (N, 2, 9): derivatives by the unknowns, then the residual; across and down the image, in sigmas.
-    by_depth (N, 2): derivative by depth. depth_downweight (N,): the factor by which the variance of depth
-    reduces the
-    weight of an error along by_depth (Sherman-Morrison). in_front (N,): in front of the camera.
+    by_depth (N, 2): derivative by depth.
+    depth_downweight (N,): the factor by which the variance of depth reduces the weight of an error along
+        by_depth (Sherman-Morrison).
+    in_front (N,): in front of the camera.
     """
     count = len(seen)
     table, by_depth = np.empty((count, 2, _UNKNOWNS + 1)), np.empty((count, 2))
     depth_downweight, in_front = np.empty(count), np.empty(count, np.bool_)
     for k in range(count):
-        x, y, z = _in_camera(pose, lines[k, 0])
-        dx, dy, dz = _turned_back(pose, lines[k, 1, 0], lines[k, 1, 1], lines[k, 1, 2])
+        x, y, z = in_camera(pose, lines[k, 0])
+        dx, dy, dz = turned_back(pose, lines[k, 1, 0], lines[k, 1, 1], lines[k, 1, 2])
         in_front[k] = z > _MIN_AHEAD_M
         inverse = 1.0 / max(z, _MIN_AHEAD_M)
         x, y = x * inverse, y * inverse
@@ -235,6 +182,25 @@ def _solved(matrix: FloatArray, side: FloatArray) -> FloatArray:
     return result
 
 
+@inlined
+def _add_prior(
+    matrix: FloatArray, side: FloatArray, prior: FloatArray, to_prior: FloatArray, first: int, end: int
+) -> None:
+    """Add the prior of the unknowns first to end - 1: information (8,), and the way to its mean (8,)."""
+    for i in range(first, end):
+        matrix[i, i] += prior[i]
+        side[i] += prior[i] * to_prior[i]
+
+
+@inlined
+def _reduce_residuals(table: FloatArray, step: FloatArray) -> None:
+    """Put the residuals in table (N, 2, 9) to where they are after a step (8,), to first order."""
+    for k in range(len(table)):
+        for i in range(_UNKNOWNS):
+            table[k, 0, _RESIDUAL] -= step[i] * table[k, 0, i]
+            table[k, 1, _RESIDUAL] -= step[i] * table[k, 1, i]
+
+
 @compiled("float64[:, :, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1]")
 def _fitted(
     lines: FloatArray, seen: FloatArray, whitening: FloatArray, start: FloatArray, sigma: FloatArray
@@ -245,7 +211,7 @@ def _fitted(
     # to_prior: from the present estimate to the prior mean. since_linearised: the sum of steps since the
     # linearisation.
     to_prior, since_linearised = np.zeros(_UNKNOWNS), np.zeros(_UNKNOWNS)
-    to_prior[:_SWEEP] = _back(pose, start)
+    to_prior[:_SWEEP] = back_to(pose, start)
     chi2, allowed = np.empty(len(seen)), np.zeros(len(seen), np.bool_)
     for iteration in range(_ITERATIONS):
         scale = _ANNEAL[iteration] if iteration < len(_ANNEAL) else 1.0
@@ -259,35 +225,28 @@ def _fitted(
                 weight = 1.0 / (scale * (1.0 + chi2[k] / (_GATE_CHI2 * scale)) ** 2)
                 _add(table[k], by_depth[k], depth_downweight[k], weight, normal)
         for i in range(_UNKNOWNS):
-            normal[i:, i] = normal[i, i:_UNKNOWNS]
+            normal[i:, i] = normal[i, i:_UNKNOWNS]  # the lower half, by symmetry
         # First with the prior of the motion alone (free), then with that of the sweep as well.
         free, free_side = normal[:, :_UNKNOWNS].copy(), normal[:, _RESIDUAL].copy()
         free_from_rad = -to_prior[_SWEEP:]
-        for i in range(_SWEEP):
-            free[i, i] += prior[i]
-            free_side[i] += prior[i] * to_prior[i]
+        _add_prior(free, free_side, prior, to_prior, 0, _SWEEP)
         information, side = free.copy(), free_side.copy()
-        for i in range(_SWEEP, _UNKNOWNS):
-            information[i, i] += prior[i]
-            side[i] += prior[i] * to_prior[i]
+        _add_prior(information, side, prior, to_prior, _SWEEP, _UNKNOWNS)
         step = _solved(information, side)
         since_linearised += step
         # step * side is the squared length of the step in standard deviations.
         if iteration >= len(_ANNEAL) and (step * side).sum() < _CONVERGED_SIGMAS**2:
             break
         if np.abs(since_linearised).max() > _STRAIGHT:
-            pose, sweep_rad = _moved(pose, since_linearised), sweep_rad + since_linearised[_SWEEP:]
+            pose, sweep_rad = moved(pose, since_linearised), sweep_rad + since_linearised[_SWEEP:]
             since_linearised[:] = 0.0
             table, by_depth, depth_downweight, in_front = _linearised(lines, seen, whitening, pose, sweep_rad)
-            to_prior[:_SWEEP], to_prior[_SWEEP:] = _back(pose, start), -sweep_rad
+            to_prior[:_SWEEP], to_prior[_SWEEP:] = back_to(pose, start), -sweep_rad
         else:
             to_prior -= step
-            for k in range(len(seen)):
-                for i in range(_UNKNOWNS):
-                    table[k, 0, _RESIDUAL] -= step[i] * table[k, 0, i]
-                    table[k, 1, _RESIDUAL] -= step[i] * table[k, 1, i]
-    pose, inliers = _moved(pose, since_linearised), 0
+            _reduce_residuals(table, step)
+    pose, inliers = moved(pose, since_linearised), 0
     for k in range(len(seen)):
         inliers += allowed[k] and chi2[k] <= _GATE_CHI2
     sweep_rad = sweep_rad + since_linearised[_SWEEP:]
-    return pose, sweep_rad, _back(pose, start), information, inliers, free, free_side, free_from_rad
+    return pose, sweep_rad, back_to(pose, start), information, inliers, free, free_side, free_from_rad

@@ -30,7 +30,9 @@ def written(folder: Path, content: dict[str, object]) -> Path:
 
 
 @pytest.mark.parametrize("base", [SIM, {}], ids=["robot", "replay"])
-def test_who_is_reckoned_with_must_be_believed(tmp_path: Path, base: dict[str, object]) -> None:
+def test_perception_must_believe_every_speed_that_the_decision_allows_for(
+    tmp_path: Path, base: dict[str, object]
+) -> None:
     load = load_app if base else load_replay
     load(written(tmp_path, base | speeds(2.0, 2.0)))
     load(written(tmp_path, base | speeds(1.5, 2.0)))
@@ -54,7 +56,7 @@ def test_a_recording_may_be_looked_at_with_the_yaml_of_its_robot(path: Path) -> 
 
 
 @pytest.mark.parametrize("base", [SIM, {}], ids=["robot", "replay"])
-def test_what_the_speed_counts_on_having_seen_must_be_looked_at(
+def test_the_range_of_sight_must_not_exceed_the_range_of_depth(
     tmp_path: Path, base: dict[str, object]
 ) -> None:
     def ranges(counted_on_m: float, looked_at_m: float) -> dict[str, object]:

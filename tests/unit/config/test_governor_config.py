@@ -3,16 +3,16 @@ from pathlib import Path
 import pytest
 import yaml
 
-from config.app import load_app
+from config.app import AppConfig, load_app
 from config.loader import CONFIG_DIR, ConfigError
 
 SHIPPED = yaml.safe_load((CONFIG_DIR / "governor.yaml").read_text())
 
 
-def loaded(folder: Path, **changes: object) -> None:
+def loaded(folder: Path, **changes: object) -> AppConfig:
     path = folder / "governor.yaml"
     path.write_text(yaml.safe_dump(SHIPPED | changes))
-    load_app(path)
+    return load_app(path)
 
 
 def test_the_file_that_ships_loads_and_says_every_default() -> None:
@@ -53,4 +53,6 @@ def test_a_path_and_a_governor_do_not_go_together(tmp_path: Path) -> None:
 
 
 def test_a_robot_with_a_governor_needs_no_path(tmp_path: Path) -> None:
-    loaded(tmp_path, camera={"kind": "realsense"}, simulation=None)
+    config = loaded(tmp_path, camera={"kind": "realsense"}, simulation=None)
+    assert config.governor is not None
+    assert config.path is None

@@ -117,7 +117,7 @@ def test_arming_gives_up_and_says_what_was_missing() -> None:
         ({"status_ns": -461 * MS}, ChassisMode.LOST, "no status for 701 ms"),
     ],
 )
-def test_armed_latches(changes: dict[str, object], mode: ChassisMode, reason: str) -> None:
+def test_every_fault_latches_while_armed(changes: dict[str, object], mode: ChassisMode, reason: str) -> None:
     state = step(armed(), at(240, **changes), LIMITS)
     assert (state.mode, state.reason) == (mode, reason)
     for now_ms in range(260, 2000, 20):

@@ -99,7 +99,7 @@ def test_a_surface_that_stands_is_listed_from_the_third_sight_on_and_never_moves
     np.testing.assert_allclose(still.velocity_mps, 0.0, atol=0.02)
 
 
-def test_who_leaves_the_table_that_he_stood_at_is_the_mover_and_not_the_table() -> None:
+def test_a_person_who_leaves_a_table_is_the_mover_and_not_the_table() -> None:
     """They touched, one connected part; 0.37 s after his first step he is 0.29 m away from it."""
     stood, steps = 12, 11
     depths_m = [
@@ -123,9 +123,7 @@ def test_somebody_may_come_into_a_view_in_which_there_was_nothing() -> None:
 
 
 @pytest.mark.parametrize(("off_m", "comes_back"), [(-0.5, False), (0.6, True)])
-def test_what_was_seen_before_and_while_the_cameras_motion_was_lost_proves_nothing(
-    off_m: float, comes_back: bool
-) -> None:
+def test_views_from_before_and_during_lost_ego_motion_prove_nothing(off_m: float, comes_back: bool) -> None:
     """For three frames its motion is not known; where it believes to be is off, and stays so or not."""
     tracker = Tracker(PerceptionConfig(), body_height_m=1.5, clearance_m=0.05)
     grid, off = grid_of(nearest(walker(0.3), wall(6.0))), Pose(np.eye(3), np.array([0.0, 0.0, off_m]))
@@ -140,7 +138,7 @@ def behind(x_m: float, pillar_m: tuple[float, float] = (0.5, 1.0)) -> FloatArray
     return nearest(walker(x_m), wall(6.0), plate(2.5, pillar_m, (-0.9, 0.9)))
 
 
-def test_what_is_left_to_see_of_a_mover_behind_something_does_not_drag_its_position() -> None:
+def test_the_visible_rest_of_a_hidden_mover_does_not_drag_its_position() -> None:
     """A curtain is drawn: of the walker the left quarter is to be seen, with its middle 0.19 m off."""
     start_m, drawn = -0.9, 30
     depths_m = [behind(start_m + way_m(k), (0.9, 1.0)) for k in range(drawn)]
@@ -158,7 +156,7 @@ def test_what_is_left_to_see_of_a_mover_behind_something_does_not_drag_its_posit
 
 
 @pytest.mark.parametrize("every", [1, 3, 6])
-def test_who_came_out_from_behind_something_tells_how_fast_he_goes_at_any_frame_rate(every: int) -> None:
+def test_a_mover_that_came_out_from_behind_something_is_measured_at_any_frame_rate(every: int) -> None:
     """At 30, 10 and 5 frames a second. A quarter of him is seen first, and for 1.2 s all of him."""
     tracker = Tracker(PerceptionConfig(), body_height_m=1.5, clearance_m=0.05)
     for k in range(0, 43, every):
@@ -170,7 +168,7 @@ def test_who_came_out_from_behind_something_tells_how_fast_he_goes_at_any_frame_
     np.testing.assert_allclose(mover.velocity_mps, [SPEED_MPS, 0.0, 0.0], atol=0.2)
 
 
-def test_who_is_hidden_at_once_keeps_the_whole_box_and_goes_on() -> None:
+def test_a_suddenly_hidden_mover_keeps_its_whole_box_and_goes_on() -> None:
     """A curtain is drawn: first a quarter is left to see of the walker, then nothing."""
     start_m, drawn = -0.9, 30
     depths_m = [behind(start_m + way_m(k), (0.9, 1.0)) for k in range(drawn)]
@@ -220,7 +218,7 @@ def test_shoes_parted_from_their_body_by_a_hole_become_part_of_it() -> None:
         assert person.bbox_px[3] - person.bbox_px[1] > 0.95 * (1.85 / 3.0 * 300.0)
 
 
-def test_what_is_gone_is_shown_for_a_moment_while_its_place_is_in_view_and_then_no_more() -> None:
+def test_a_vanished_mover_is_listed_for_a_moment_only() -> None:
     depths_m = [walker(-0.9 + way_m(k)) for k in range(24)] + [no_depth()] * 8
     percepts = track(depths_m)
     listed = [len(one.scene.obstacles) for one in percepts[24:]]
@@ -232,7 +230,7 @@ def test_what_is_gone_is_shown_for_a_moment_while_its_place_is_in_view_and_then_
     assert kept.position_m[0] == pytest.approx(-0.9 + way_m(27), abs=0.1)
 
 
-def test_what_has_left_the_view_is_not_shown_any_longer() -> None:
+def test_a_mover_that_has_left_the_view_is_not_listed() -> None:
     # The right edge of the view is 160 / 300 * 4 = 2.1 m away.
     depths_m = [walker(0.4 + way_m(k)) for k in range(75)]
     for k, percept in enumerate(track(depths_m)):

@@ -52,14 +52,14 @@ def pusher(frame: int) -> FloatArray:
     return nearest(person, trolley, handle, _BACK)
 
 
-def test_who_pushes_something_is_one_obstacle_with_it() -> None:
+def test_a_person_and_what_he_pushes_are_one_obstacle() -> None:
     percepts = track([pusher(k) for k in range(30)])
     for percept in percepts[6:]:
         (one,) = moving(percept)
         assert one.extent_m[0] > 1.2
 
 
-def test_who_passes_something_low_that_stands_is_divided_from_it() -> None:
+def test_a_person_who_passes_a_low_static_thing_is_divided_from_it() -> None:
     """A crate beside which he walks, at his depth: one part with it as long as he touches it."""
     crate = plate(4.0, (0.0, 0.7), (0.3, 1.0))
     percepts = track([nearest(crate, walker(-1.1 + way_m(k)), _BACK) for k in range(70)])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from config.decision import SightConfig
-from controller.decision.blind_corners import BlindCorners
+from controller.decision.blind_corners import BlindCorners, SurfacesOnPath
 
 BANDS = 80
 EDGE_TAN = 0.687
@@ -37,16 +37,14 @@ class Aisle:
         to_next = np.maximum(hit, self.next_m - s_m - CAMERA_M)
         forward = np.where(behind & (to_next < 9.0), to_next, forward)
         for _ in range(times):
-            self.corners.look(
-                np.arange(BANDS),
-                forward,
-                s_m + CAMERA_M + forward,
-                -BEARING * forward,
-                np.full(BANDS, HALF_WIDTH_M),
-                2.0 * EDGE_TAN / BANDS,
-                s_m + FRONT_M,
-                np.full(BANDS, stands),
+            surfaces = SurfacesOnPath(
+                bands=np.arange(BANDS),
+                forward_m=forward,
+                s_m=s_m + CAMERA_M + forward,
+                d_m=-BEARING * forward,
+                half_width_m=np.full(BANDS, HALF_WIDTH_M),
             )
+            self.corners.look(surfaces, np.full(BANDS, stands), 2.0 * EDGE_TAN / BANDS, s_m + FRONT_M)
 
 
 @pytest.mark.parametrize("side", [1, -1])

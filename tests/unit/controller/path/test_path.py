@@ -180,8 +180,10 @@ def test_a_path_that_doubles_back_is_refused() -> None:
 
 
 def test_wide_turns_and_crossings_are_accepted() -> None:
-    path(line(5.0), arc(0.5, 180.0), line(5.0))
-    path(line(6.0), arc(2.0, 270.0), line(6.0))
+    turn = path(line(5.0), arc(0.5, 180.0), line(5.0))
+    crossing = path(line(6.0), arc(2.0, 270.0), line(6.0))
+    assert turn.length_m == pytest.approx(10.0 + 0.5 * math.pi, rel=0.2)  # blends lengthen the bend
+    assert crossing.length_m == pytest.approx(12.0 + 3.0 * math.pi, rel=0.2)
 
 
 @pytest.mark.parametrize(

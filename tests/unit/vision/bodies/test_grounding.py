@@ -54,7 +54,7 @@ def test_a_head_cut_out_of_a_wall_reaches_down_to_the_floor() -> None:
     assert measured.position_m[0, 1] > 0.3
 
 
-def test_it_ends_where_what_it_was_cut_out_of_does() -> None:
+def test_a_mover_is_extended_down_to_where_the_body_around_it_ends() -> None:
     cells, measured = given(np.where(HEAD | BODY, 4.0, 0.0), HEAD, BODY & ~HEAD)
     np.testing.assert_array_equal(cells, UNDER_HEAD & ~HEAD)
     np.testing.assert_allclose(measured.extent_m[0, 1], 1.6, atol=0.06)
@@ -85,7 +85,7 @@ def test_another_mover_keeps_what_is_its_own() -> None:
     assert not cells.any()
 
 
-def test_who_stands_on_one_foot_is_given_no_other() -> None:
+def test_a_mover_that_already_reaches_down_is_not_extended_beside_its_foot() -> None:
     """One column of him reaches down already: beside it is what he passes by."""
     leg = plate(4.0, (-0.2, -0.1), (-0.3, 0.9)) > 0.0
     cells, _ = given(np.where(HEAD | BODY, 4.0, 0.0), HEAD | leg, BODY & ~HEAD & ~leg)

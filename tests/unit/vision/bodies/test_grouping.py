@@ -13,7 +13,7 @@ from vision.bodies.grouping import attach, detach
 NOWHERE = np.zeros((4, 2), np.bool_)  # no track is expected in any of four parts
 
 
-def test_what_is_seen_through_a_mover_stays_with_it_while_most_of_it_was_there_before() -> None:
+def test_a_part_seen_through_a_mover_stays_with_it_if_most_of_it_was_there_before() -> None:
     winner, nowhere = np.array([1, 1], np.int32), NOWHERE[:2, :1]
     for wheel, votes, stays in (
         (FAR_WHEEL, 28, 1),

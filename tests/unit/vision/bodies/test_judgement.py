@@ -59,7 +59,7 @@ def test_the_filters_speed_must_be_four_sigmas() -> None:
     assert not rises(by_fragments(ACROSS, 6, covariance=covariance(0.042)))
 
 
-def test_what_creeps_is_static_however_sure() -> None:
+def test_a_creeping_track_is_static_however_certain_its_velocity() -> None:
     sure: dict[str, Any] = {"covariance": covariance(1e-4), "own_covariance": covariance(1e-4)}
     assert not rises(by_fragments((0.20, 0.0, 0.0), 20, **sure))
     assert rises(by_fragments((0.22, 0.0, 0.0), 20, **sure))
@@ -88,7 +88,7 @@ def test_along_the_line_of_sight_eight_ends_must_agree() -> None:
     assert not rises(by_fragments(ALONG, 7))
 
 
-def test_a_surface_that_contradicts_denies_a_motion_along_whatever_the_number_of_ends() -> None:
+def test_a_contradicting_surface_denies_motion_along_for_any_number_of_ends() -> None:
     assert not rises(by_fragments(ALONG, 40, **surface(STILL, 0.08)))
     assert rises(by_fragments(ALONG, 8, **surface(STILL, 0.106)))
 
@@ -117,7 +117,7 @@ def test_a_surface_seen_long_enough_without_a_break_proves_by_itself() -> None:
     assert not rises(by_surface(ALONG, 0.45, **deep))  # noise of depth is shared by neighbours: longer
 
 
-def test_along_the_line_of_sight_a_way_far_beyond_the_noise_of_depth_proves_as_soon_as_across() -> None:
+def test_a_displacement_far_beyond_depth_noise_proves_motion_as_soon_along_as_across() -> None:
     assert rises(by_surface(ALONG, 0.3, depth_sigma_m=np.array([0.059])))  # 0.24 m, more than 4 sigmas
     assert not rises(by_surface(ALONG, 0.3, depth_sigma_m=np.array([0.061])))
     assert not rises(by_surface(ALONG, 0.2, depth_sigma_m=np.array([0.01])))
@@ -160,7 +160,7 @@ def test_a_surface_that_comes_to_be_seen_makes_its_middle_wander_too() -> None:
     assert not rises(by_surface(ACROSS, 1.0, growth_mps=np.array([0.62])))
 
 
-def test_what_stands_where_space_was_free_has_come() -> None:
+def test_a_static_surface_where_space_was_free_has_arrived() -> None:
     """Eight cells, a twentieth of all, and a speed of half the squared sigmas."""
     assert rises(one(ACROSS, arrived=np.array([8])))
     assert not rises(one(ACROSS, arrived=np.array([7])))

@@ -75,7 +75,7 @@ def test_halves_of_one_persons_width_are_one() -> None:
     assert merged(Body(-0.23, width=0.41), Body(0.23, width=0.41, cells=190)) == []
 
 
-def test_what_overlaps_in_the_image_by_half_is_one_even_when_large_and_somewhat_deeper() -> None:
+def test_pieces_that_overlap_by_half_in_the_image_are_one_even_if_large_and_deeper() -> None:
     wide = Body(0.0, width=1.0, cells=300)
     assert merged(wide, Body(0.3, z=4.45, width=0.9, cells=250)) == [(1, 0)]  # 0.25 m behind
     assert merged(wide, Body(0.3, z=4.58, width=0.9, cells=250)) == [(1, 0)]  # 0.38
@@ -105,7 +105,7 @@ def test_of_two_that_a_part_may_belong_to_the_closer_one_comes_first() -> None:
     assert merged(deep, Body(0.1, z=4.1, width=0.4), shank)[0] == (2, 1)
 
 
-def test_what_stands_on_a_mover_in_the_image_and_goes_exactly_as_it_does_is_carried_by_it() -> None:
+def test_a_piece_above_a_mover_with_exactly_its_velocity_is_carried_by_it() -> None:
     assert merged(CART, MAST) == [(1, 0)]
     assert merged(CART, replace(MAST, y=-0.4)) == []  # it ends above the cart
     assert merged(CART, replace(MAST, x=0.5, width=0.4)) == []  # and this beside it

@@ -99,7 +99,7 @@ def two_fragments() -> Detection:
     )
 
 
-def test_fragments_have_their_middle_in_space_and_no_velocity_that_was_not_measured() -> None:
+def test_reported_fragments_have_a_position_and_nan_for_an_unmeasured_velocity() -> None:
     velocity: FloatArray = np.array([[0.1, 0.2, 0.3], [0.4, 0.5, 0.6]])
     covariance = np.tile(np.diag([0.01, 0.04, 0.09]), (2, 1, 1))
     owner, moving = np.array([5, -1]), np.array([True, False])
@@ -142,7 +142,7 @@ def test_a_mover_out_of_sight_is_listed_while_it_is_known_where_it_goes() -> Non
     assert len(report.obstacles(made, now())) == 1
 
 
-def test_a_mover_of_which_a_sliver_is_left_to_see_has_its_whole_box_and_the_sliver() -> None:
+def test_the_box_of_a_nearly_hidden_mover_covers_its_whole_body_and_the_visible_sliver() -> None:
     made = tracks((0.5, 0.0, 3.0))
     made.moving[:], made.nearly_hidden[:] = True, True
     made.bbox_px[:] = [170.0, 40.0, 190.0, 60.0]
@@ -153,7 +153,7 @@ def test_a_mover_of_which_a_sliver_is_left_to_see_has_its_whole_box_and_the_sliv
 
 
 @pytest.mark.parametrize("unseen_s", [0.0, 0.1])
-def test_of_whom_hardly_anything_is_left_to_see_is_not_listed(unseen_s: float) -> None:
+def test_a_mover_of_which_hardly_anything_is_visible_is_not_listed(unseen_s: float) -> None:
     made = tracks((0.5, 0.0, 3.0), unseen_s=unseen_s)
     made.moving[:], made.nearly_hidden[:] = True, True
     made.covariance[:] = 0.01 * np.eye(6)
@@ -199,7 +199,7 @@ def told_moving(made: Tracks) -> list[bool]:
     return [one.moving for one in report.obstacles(made, now())]
 
 
-def test_a_new_mover_at_a_larger_one_may_be_a_piece_of_it_and_is_listed_without_a_verdict() -> None:
+def test_a_new_mover_at_a_larger_one_is_listed_as_static_at_first() -> None:
     made = large_and_new()
     made.state[1, 3:] = [0.5, 0.0, 0.0]
     large, new = report.obstacles(made, now())
@@ -230,7 +230,7 @@ def beside_what_stands(**new: Any) -> Tracks:
 
 
 @pytest.mark.parametrize("box_px", [(130.0, 150.0, 150.0, 170.0), (139.0, 150.0, 159.0, 170.0)])
-def test_what_only_a_guess_parts_from_what_stands_may_be_a_piece_of_somebody(box_px: Any) -> None:
+def test_a_small_mover_with_a_guessed_border_may_be_a_piece_of_a_person(box_px: Any) -> None:
     assert told_moving(beside_what_stands(box_px=box_px)) == [False, False]
 
 
@@ -244,11 +244,13 @@ def test_what_only_a_guess_parts_from_what_stands_may_be_a_piece_of_somebody(box
     ],
     ids=["for longer", "beside", "behind", "half of a body"],
 )
-def test_who_is_no_piece_beside_what_stands_is_told_at_once(apart: dict[str, Any]) -> None:
+def test_a_mover_that_is_no_piece_beside_a_static_track_is_listed_as_moving_at_once(
+    apart: dict[str, Any],
+) -> None:
     assert told_moving(beside_what_stands(**apart)) == [False, True]
 
 
-def test_who_ends_at_edges_in_depth_beside_what_stands_is_told_at_once() -> None:
+def test_a_mover_that_ends_at_depth_edges_is_listed_as_moving_at_once() -> None:
     made = beside_what_stands()
     made.border_is_guess[1] = False
     assert told_moving(made) == [False, True]
@@ -260,7 +262,7 @@ def test_a_new_mover_at_something_that_is_not_listed_is_told_at_once() -> None:
     assert told_moving(made) == [True]
 
 
-def test_of_two_new_movers_the_larger_one_is_told() -> None:
+def test_of_two_new_movers_the_larger_one_is_listed_as_moving() -> None:
     made = large_and_new()
     made.moving_s[0] = 0.1
     assert told_moving(made) == [True, False]

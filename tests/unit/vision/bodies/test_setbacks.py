@@ -74,7 +74,7 @@ def test_a_clock_that_steps_back_is_taken_as_true_after_three_frames(
     assert all(0.0 <= one.unseen_s < 0.2 and 0.0 <= one.age_s < 1.0 for one in scenes[-1].obstacles)
 
 
-def test_so_is_one_that_was_in_the_future_for_a_frame() -> None:
+def test_after_one_frame_stamped_in_the_future_tracking_goes_on() -> None:
     scenes = seen({5: 10**10, 6: -(10**10)})
     assert scenes[8].health.condition is CameraCondition.UNTRUSTWORTHY
     assert [scene.health.condition for scene in scenes[9:]] == [CameraCondition.GOOD] * (COUNT - 9)

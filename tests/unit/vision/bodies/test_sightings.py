@@ -60,15 +60,13 @@ def reaching_in(moving: bool) -> float:
     return float(tracks.state[0, 3])
 
 
-def test_a_surface_that_is_cut_tells_roughly_of_the_velocity_of_what_is_known_to_move() -> None:
+def test_a_cut_surface_measures_the_velocity_of_a_known_mover_roughly() -> None:
     assert 0.3 < reaching_in(moving=True) < 1.2  # its middle goes half as fast as its rim
     assert reaching_in(moving=False) == 0.0  # of what stands a new rim is no motion
 
 
 @pytest.mark.parametrize(("board_m", "whole"), [(9.0, True), (1.5, False)])
-def test_a_surface_that_something_nearer_reaches_over_tells_nothing_of_its_motion_by_itself(
-    board_m: float, whole: bool
-) -> None:
+def test_an_overlapped_surface_alone_proves_no_motion(board_m: float, whole: bool) -> None:
     """Somebody who passes before a crate hides more and more of it: its middle goes, but it stands."""
     tracks = Tracks()
     tracks.start(np.array([[0.0, 0.0, 3.0]]), 0.2, 1.5, 0.0, 0)

@@ -92,7 +92,7 @@ def test_a_shared_part_is_divided_by_the_nearest_vote() -> None:
     assert not labels[PART == 0].any()
 
 
-def test_who_has_no_claim_to_a_part_gets_no_cell_of_it() -> None:
+def test_a_track_without_a_claim_to_a_part_gets_no_cell_of_it() -> None:
     expected = labelled(block((10, 30), (10, 20)), block((10, 30), (20, 35)), block((10, 30), (35, 50)))
     ballot = votes.count_votes(PART, 1, expected, 3, np.array([False, False, True]))
     labels = votes.divide(PART, expected, ballot, ballot.winner)
@@ -158,7 +158,7 @@ def test_a_mover_keeps_what_came() -> None:
     np.testing.assert_array_equal(left.winner, before.winner)
 
 
-def test_what_came_in_two_parts_has_left_nothing_behind() -> None:
+def test_a_track_that_arrived_in_two_parts_keeps_its_claims() -> None:
     """Nothing of the track stood there before: it is the track itself."""
     before = ballot((True, False), (True, False))
     left = votes.drop_static_from_arrived(before, np.array([200, 200]), np.array([150, 150]), MOVES)

@@ -42,7 +42,7 @@ def test_it_keeps_what_nothing_that_stands_claims_and_where_it_may_be_still(
     assert not lost.any()
 
 
-def test_who_is_in_sight_somewhere_else_is_not_hidden() -> None:
+def test_a_mover_in_sight_elsewhere_is_not_hidden() -> None:
     parts = labelled(block((10, 30), (10, 50)), block((35, 45), (10, 20)))
     expected = (parts == 1) & ~HALF, HALF | (parts == 2)
     before = vote(*expected, mover=(False, True), parts=parts)

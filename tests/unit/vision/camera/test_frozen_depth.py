@@ -33,7 +33,7 @@ def with_depth_of(frame: RgbdFrame, other: RgbdFrame) -> RgbdFrame:
     return replace(frame, depth=other.depth.copy())
 
 
-def test_frozen_beside_live_colour_it_is_not_to_be_trusted_from_its_third_repetition_on() -> None:
+def test_frozen_depth_beside_live_colour_is_untrustworthy_from_its_third_repetition_on() -> None:
     frozen = [with_depth_of(frame, DRIVING[0]) for frame in DRIVING[:8]]
     found = healths([*frozen, *DRIVING[8:]])
     assert [health.condition for health in found[:3]] == [GOOD] * 3

@@ -46,14 +46,14 @@ def test_a_pitch_that_is_plainly_wrong_is_told_with_the_right_one(pitch_deg: flo
 
 
 @pytest.mark.parametrize("height_m", [0.9, 0.38])
-def test_so_is_a_height(height_m: float) -> None:
+def test_a_wrong_height_is_noticed(height_m: float) -> None:
     reason = judged(*[floor(height_m=height_m)] * 3).reason
     assert f"the camera is {height_m:.2f} m high" in reason
     assert reason.endswith("is its mounting right?")
 
 
 @pytest.mark.parametrize("factor", [0.2, 5.0])
-def test_so_is_depth_in_another_unit(factor: float) -> None:
+def test_depth_in_another_unit_is_noticed(factor: float) -> None:
     reason = judged(*[floor(height_m=factor * HEIGHT_M)] * 3).reason
     assert f"the camera is {factor * HEIGHT_M:.2f} m high" in reason
     assert reason.endswith("is the unit of its depth right?")

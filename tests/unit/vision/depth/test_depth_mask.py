@@ -28,7 +28,7 @@ def test_sigma_grows_with_the_square_of_depth() -> None:
     assert depth_sigma_m(np.array([5.0]), NOISE)[0] == pytest.approx(0.19, abs=0.005)
 
 
-def test_one_surface() -> None:
+def test_an_end_on_one_surface_has_one_depth() -> None:
     found = at_middle(flat(2345))
     np.testing.assert_allclose(found.near_m, [2.345], rtol=1e-6)
     np.testing.assert_allclose(found.far_m, [2.345], rtol=1e-6)

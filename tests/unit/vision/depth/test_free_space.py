@@ -277,7 +277,7 @@ def test_where_the_floor_comes_into_view_is_told(height_m: float, pitch_deg: flo
     assert edge_m < space_of(frame_of(floor(), mount), mount).floor_from_m < 1.05 * edge_m
 
 
-def test_where_no_floor_is_in_view_it_never_comes_and_without_a_mounting_nobody_knows() -> None:
+def test_without_floor_in_view_floor_from_is_never_and_without_a_mounting_it_is_0() -> None:
     up = CameraMount(0.0, 0.0, 0.6, math.radians(-40.0))
     assert space_of(frame_of(floor()), up).floor_from_m == NEVER_M
     # Beyond the depth mask, too: the lower edge looks down by 3.5 degrees.

@@ -26,7 +26,7 @@ from vision.depth import connected, regions
 CELL_M = STEP_PX / CAMERA.fx  # of a cell one metre away
 
 
-def test_what_a_plate_measures_by_hand() -> None:
+def test_measures_of_a_plate_by_hand() -> None:
     depth_m = plate(3.0, (-0.6, 0.2), (-0.5, 0.3))
     measured = regions.measure(grid_of(depth_m), labelled(depth_m > 0.0), 2)
     assert measured.cells.tolist() == [np.count_nonzero(depth_m), 0]
@@ -61,7 +61,7 @@ def test_a_part_at_the_images_border_is_not_whole() -> None:
         assert not regions.measure(grid_of(wall(3.0)), labelled(mask), 1).whole[0]
 
 
-def test_what_is_cut_above_or_below_still_has_its_width_and_the_other_way_round() -> None:
+def test_a_part_cut_above_or_below_has_its_width_and_one_cut_at_a_side_its_height() -> None:
     tall = np.zeros((ROWS, COLUMNS), np.bool_)
     tall[0:40, 9:20] = True
     wide = np.zeros((ROWS, COLUMNS), np.bool_)
@@ -71,7 +71,7 @@ def test_what_is_cut_above_or_below_still_has_its_width_and_the_other_way_round(
     assert measured.top_and_bottom_visible.tolist() == [False, True]
 
 
-def test_what_ends_where_no_edge_in_depth_is_was_divided_by_guess() -> None:
+def test_a_border_without_an_edge_in_depth_is_a_guess() -> None:
     """Two halves of one plate, and the same two 0.6 m apart in depth."""
     left, right = plate(4.0, (-0.4, 0.0), (-0.6, 0.8)), plate(4.0, (0.0, 0.4), (-0.6, 0.8))
     assert beside(left, right).sides_visible.tolist() == [False, False]
@@ -91,7 +91,7 @@ def test_the_box_reaches_down_to_the_floor_that_a_body_stands_on() -> None:
 
 
 @pytest.mark.parametrize(("end_m", "stands"), [(0.83, True), (0.8, False), (0.6, False)])
-def test_what_hangs_has_no_feet(end_m: float, stands: bool) -> None:
+def test_a_hanging_part_has_no_foot(end_m: float, stands: bool) -> None:
     """Depth may be missing over 0.12 m and 0.015 m for each metre of distance: 0.18 m; it is over 0.173 m,
     and, one cell less, over 0.227 m."""
     depth_m = plate(4.0, (-0.3, 0.3), (-0.6, end_m))
@@ -150,7 +150,7 @@ def test_a_part_of_which_only_a_corner_is_hidden_is_whole(top_m: float, whole: b
     assert measured.whole.tolist() == [whole, True]
 
 
-def test_what_a_stereo_camera_does_not_see_beside_something_nearer_is_hidden_by_it() -> None:
+def test_a_gap_of_a_stereo_camera_beside_a_nearer_surface_counts_as_hidden() -> None:
     """Three cells without a depth between the two, and four."""
     far, near = plate(4.0, (-0.8, 0.0), (-0.6, 0.8)), plate(2.5, (0.0, 0.4), (-0.8, 0.8))
     for gap, whole in ((3, False), (4, True)):

@@ -55,7 +55,7 @@ def test_parts_are_measured_where_they_are() -> None:
     assert found.whole.tolist() == [False, False, True]
 
 
-def test_who_looks_along_the_side_of_a_box_does_not_take_it_for_wider() -> None:
+def test_a_box_seen_along_its_side_is_measured_no_wider() -> None:
     """Its front from 0.1 to 0.3 m at 2 m; before that its side, which goes back to 4 m."""
     depth, labels = flat(8.0), np.zeros(SHAPE, np.int32)
     for column in range(18, 31):
@@ -68,7 +68,7 @@ def test_who_looks_along_the_side_of_a_box_does_not_take_it_for_wider() -> None:
     assert mirrored.extent_m[0, 0] == pytest.approx(found.extent_m[0, 0], abs=1e-6)
 
 
-def test_what_goes_back_and_outwards_is_as_wide_as_its_ends_are_apart() -> None:
+def test_a_receding_surface_is_as_wide_as_its_rims_are_apart() -> None:
     """Columns 30 down to 26, from 0.29 m aside at 2 m to 0.42 m at 4 m."""
     depth, labels = flat(8.0), np.zeros(SHAPE, np.int32)
     for column in range(26, 31):
@@ -100,7 +100,7 @@ def test_labels_that_do_not_fit_into_the_sort_are_measured_alike(seed: int) -> N
         np.testing.assert_array_equal(getattr(few, name)[:3], getattr(many, name)[:3])
 
 
-def test_what_something_nearer_hides_is_not_whole() -> None:
+def test_a_part_hidden_by_something_nearer_is_not_whole() -> None:
     depth, labels = flat(4.0), np.zeros(SHAPE, np.int32)
     labels[4:20, 4:12] = 1
     labels[4:20, 20:28] = 2

@@ -126,7 +126,7 @@ def test_the_odometry_decides_when_a_near_body_fills_most_of_the_view(
 
 
 @pytest.mark.parametrize("way_m", [(0.05, 0.0, 0.0), (0.0, 0.0, -0.03)])
-def test_what_nearly_all_deny_is_disputed(way_m: tuple[float, float, float]) -> None:
+def test_a_prior_that_nearly_all_points_contradict_is_disputed(way_m: tuple[float, float, float]) -> None:
     """Also where the odometry is so wrong that nearly no point is where it expects it."""
     static = anchors()
     now = static.points_m + np.where(share(160, 0.95)[:, None], way_m, 0.0)

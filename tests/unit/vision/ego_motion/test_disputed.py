@@ -57,7 +57,7 @@ def movers(scenes: list[Scene]) -> int:
         pytest.param(0.5, 0.0, id="stuck"),
     ],
 )
-def test_what_nearly_all_fragments_deny_makes_nothing_move(true_mps: float, reckoned_mps: float) -> None:
+def test_a_disputed_motion_makes_nothing_move(true_mps: float, reckoned_mps: float) -> None:
     percepts = look(take(true_mps), reckoned(drive(reckoned_mps)))
     scenes = [one.scene for one in percepts]
     assert movers(scenes) == 0
@@ -71,7 +71,7 @@ def test_what_nearly_all_fragments_deny_makes_nothing_move(true_mps: float, reck
     assert np.median(ways_m) == pytest.approx(true_mps / 30.0, abs=3e-3)
 
 
-def test_what_no_tracked_base_does_is_disputed_without_odometry_too_and_not_called_its_fault() -> None:
+def test_motion_impossible_for_a_tracked_base_is_disputed_without_blaming_the_odometry() -> None:
     """The base slides to the left, as on a slope of ice; the images are all that there is."""
     shown = noisy(record(room(), lambda time_s: PlanarPose(0.0, 0.6 * time_s, 0.0), COUNT, QVGA))
     eyes = perception()

@@ -60,7 +60,7 @@ def test_without_a_sweep_nothing_changes() -> None:
 
 
 @given(st.floats(-0.01, 0.01), st.floats(-0.01, 0.01))
-def test_what_turning_bends_is_straightened_to_a_hundredth_of_a_pixel(about_x: float, about_y: float) -> None:
+def test_bending_by_a_turn_is_corrected_to_a_hundredth_of_a_pixel(about_x: float, about_y: float) -> None:
     sweep_rad = np.array([about_x, about_y])
     off = straight_rays(bent(points(40), HERE, sweep_rad), CAMERA, sweep_rad) - rays(
         project(points(40), CAMERA), CAMERA
@@ -95,7 +95,7 @@ def test_the_sweep_is_found_with_the_motion() -> None:
     np.testing.assert_array_less(np.abs(found.sweep_rad - sweep_rad), 4.0 * sigma)
 
 
-def test_what_the_image_tells_of_the_sweep_does_not_depend_on_what_was_assumed() -> None:
+def test_the_measured_sweep_does_not_depend_on_its_prior() -> None:
     """Or nobody would ever learn that the rows take longer than was thought."""
     sweep_rad = np.array([0.002, -0.001])
     free, bound = found_from(sweep_rad, 0.005)[0], found_from(sweep_rad, 1e-5)[0]
@@ -120,7 +120,7 @@ def test_a_bend_that_is_not_admitted_becomes_motion() -> None:
     assert rigid > 3.0 * bending
 
 
-def test_what_is_plain_to_see_is_straightened_before_anything_is_known_of_the_read_out() -> None:
+def test_a_clear_sweep_is_corrected_before_the_read_out_time_is_known() -> None:
     sweep_rad = np.array([0.005, -0.003])
     bound, open_minded = found_from(sweep_rad, 1e-9)[0], found_from(sweep_rad, 1e-9, 0.004)[0]
     assert np.abs(bound.sweep_rad).max() < 1e-8
@@ -128,7 +128,7 @@ def test_what_is_plain_to_see_is_straightened_before_anything_is_known_of_the_re
     assert open_minded.inlier_ratio > bound.inlier_ratio + 0.05
 
 
-def test_what_is_possible_bends_no_straight_image() -> None:
+def test_a_wide_prior_of_the_sweep_bends_no_straight_image() -> None:
     assert np.abs(found_from(np.zeros(2), 1e-9, 0.004)[0].sweep_rad).max() < 1e-8
 
 

@@ -122,7 +122,7 @@ NAN = float("nan")
         ([NAN] * 5, False),
     ],
 )
-def test_what_is_on_one_surface(near_m: list[float], good: bool) -> None:
+def test_depth_along_a_segment_decides_whether_it_is_on_one_surface(near_m: list[float], good: bool) -> None:
     # The gate at 2 m: 0.05 + 3 (0.005 + 0.0075 * 4) = 0.155.
     assert on_one_surface(np.array([near_m]), CONFIG).tolist() == [good]
 

@@ -166,7 +166,7 @@ def test_a_pyramid_ends_where_an_image_would_be_smaller_than_the_window(
     assert len(pyramid(np.zeros(size, np.uint8), SETTINGS)) == levels
 
 
-def test_no_points() -> None:
+def test_tracking_no_points_finds_none() -> None:
     none = np.empty((0, 2), np.float32)
     flow = track(pattern(1), pattern(1), none, none, np.empty((0, 3), np.float32), SETTINGS)
     assert flow.pixels.shape == (0, 2)
@@ -205,7 +205,7 @@ def test_what_comes_back_inside_of_the_image_is_confirmed(
     assert confirmed.tolist() == [good]
 
 
-def test_along_its_edge_an_end_is_where_it_is_expected_and_across_where_it_is_found() -> None:
+def test_an_end_is_where_it_is_expected_along_its_edge_and_where_it_is_found_across_it() -> None:
     """Variances 12 and 0 px^2 of the search against 4 of the expectation: a quarter and all of the way."""
     there, expected = np.array([[38.0, 38.0]], np.float32), np.array([[30.0, 30.0]], np.float32)
     covariance, none = np.array([[12.0, 0.0, 0.0]], np.float32), np.zeros((1, 2), np.float32)

@@ -42,7 +42,7 @@ def test_at_first_it_looks_everywhere() -> None:
 
 
 @pytest.mark.parametrize(("missing", "parts"), [(15, 1), (40, 2)])
-def test_then_in_one_part_after_the_other_and_in_a_whole_band_where_many_are_missing(
+def test_later_the_image_is_searched_part_by_part_and_a_whole_band_if_many_are_missing(
     missing: int, parts: int
 ) -> None:
     frame, grey = picture()

@@ -107,7 +107,7 @@ def test_cleared_it_begins_anew_with_new_ids(count: int) -> None:
     assert store.ids.tolist() == list(range(4, 4 + count))
 
 
-def test_who_is_a_witness_stays_one() -> None:
+def test_a_body_only_fragment_stays_body_only() -> None:
     store = FragmentStore()
     add(store, 3)
     ends, depth = np.zeros((2, 2, 2), np.float32), np.ones((2, 2), np.float32)

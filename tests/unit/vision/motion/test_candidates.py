@@ -65,7 +65,7 @@ def test_a_chain_of_neighbours_is_one_group_named_after_its_first() -> None:
     assert grouped(chain) == [0, 1, 0, 0, 0, 5]
 
 
-def test_upwards_neighbours_may_be_farther_and_along_the_view_as_far_as_depth_is_known() -> None:
+def test_neighbours_may_be_farther_apart_upwards_and_along_the_view() -> None:
     assert grouped([[0.0, 0.0, 4.0], [0.0, 0.83, 4.0]]) == [0, 0]
     assert grouped([[0.0, 0.0, 4.0], [0.0, 0.84, 4.0]]) == [0, 1]
     # 0.5 m and 0.1 m of either.

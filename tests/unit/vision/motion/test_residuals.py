@@ -133,7 +133,7 @@ def test_missing_depth_is_a_distant_point_hardly_known_and_not_used() -> None:
     assert np.isfinite(motion.static_chi2).all()
 
 
-def test_before_something_distant_an_end_tells_of_the_cameras_turn_whichever_of_both_it_is_on() -> None:
+def test_an_end_before_a_distant_surface_measures_the_cameras_turn_on_either_surface() -> None:
     store = FragmentStore()
     pixels = project(ENDS_M, CAMERA).astype(np.float32)[None]
     near, far = np.full((1, 2), 5.0, np.float32), np.array([[14.0, 9.9]], np.float32)

@@ -76,7 +76,7 @@ def test_correlated_pixels_are_weighted_by_the_inverse_of_their_covariance() -> 
     np.testing.assert_allclose(equations[9:].T[0], rows.T @ weight @ [0.4, 0.1])
 
 
-def test_what_has_no_weight_says_nothing_even_if_it_is_no_number() -> None:
+def test_points_of_weight_0_do_not_count_even_if_they_are_nan() -> None:
     static, ray = np.tile([1.0, 0.0, 4.0], (2, 1)), np.tile([0.5, 0.0], (2, 1))
     motion = points(static, ray, 2.0)
     motion.residual_m[1] = motion.covariance[1] = np.nan

@@ -69,7 +69,7 @@ def test_many_measurements_of_a_steady_walk_find_its_speed() -> None:
 UPRIGHT = np.array([0.0, -1.0, 0.0])
 
 
-def test_a_vertical_velocity_lasts_for_a_tenth_of_a_second_and_a_level_one_goes_on() -> None:
+def test_a_vertical_velocity_decays_in_a_tenth_of_a_second_and_a_level_one_stays() -> None:
     state = np.array([[0.0, 0.0, 4.0, 0.6, 1.0, -0.8]])
     moved, _ = kalman.predict(state, np.eye(6)[None], 0.1, 0.0, UPRIGHT)
     np.testing.assert_allclose(moved[0, 3:], [0.6, np.exp(-1.0), -0.8])
