@@ -17,9 +17,12 @@ from controller.bench.opencv_calls import OpenCvCall
 from vision.fragments import lucas_kanade
 from vision.fragments.edges import GreyImage
 
-# Iterations, convergence and least eigenvalue are those of lucas_kanade.py; test_own_search.py compares them.
-_CRITERIA = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 10, 0.02)
-_MIN_EIGENVALUE = 1e-5  # in OpenCV's units: (grey levels / px)^2 / 1024, per pixel of the window
+_CRITERIA = (
+    cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS,
+    lucas_kanade.ITERATIONS,
+    lucas_kanade.CONVERGED_PX,
+)
+_MIN_EIGENVALUE = lucas_kanade.MIN_EIGENVALUE / 1024.0  # OpenCV counts in (grey levels / px)^2 / 1024
 # The minimum eigenvalue is available anyway; OpenCV would compute its other error measure pixel by pixel.
 _FLAGS = cv2.OPTFLOW_USE_INITIAL_FLOW | cv2.OPTFLOW_LK_GET_MIN_EIGENVALS
 

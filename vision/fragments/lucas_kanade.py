@@ -25,12 +25,12 @@ from vision.fragments.edges import GreyImage
 Values = NDArray[np.int16]
 FourSums = tuple[float, float, float, float]  # upper left, upper right, lower left, lower right
 
-_ITERATIONS = 10
-_CONVERGED_PX = 0.02  # a shorter step is the last one: far below an end's own sigma
+ITERATIONS = 10
+CONVERGED_PX = 0.02  # a shorter step is the last one: far below an end's own sigma
 _OSCILLATION_PX = 0.01  # a step that takes back the one before, up to this, is halved, and is the last one
 # Minimum of the smaller eigenvalue of the structure tensor, per pixel of the window, in (grey levels / px)^2.
 # It is low, so that straight edges pass: along the edge the expectation holds them (optical_flow.py).
-_MIN_EIGENVALUE = 0.01
+MIN_EIGENVALUE = 0.01
 _MIN_DETERMINANT = 0.125  # of the structure tensor, a sum over the window
 _ROW, _WINDOW = 16, 64  # a row is a multiple of the first, a window of the second
 _SHARE_BITS = 15  # of a number between 0 and 1
@@ -179,7 +179,7 @@ def _inverse(xx: float, xy: float, yy: float, side: int) -> tuple[bool, float, f
     """Whether a structure tensor can be inverted, and its inverse, for mismatches in the scale of _SCHARR."""
     smaller = 0.5 * (xx + yy - math.sqrt((xx - yy) ** 2 + 4.0 * xy * xy))
     determinant = xx * yy - xy * xy
-    usable = smaller >= _MIN_EIGENVALUE * side * side and determinant >= _MIN_DETERMINANT
+    usable = smaller >= MIN_EIGENVALUE * side * side and determinant >= _MIN_DETERMINANT
     scale = 1.0 / (_SCHARR * determinant) if usable else 0.0
     return usable, scale * yy, -scale * xy, scale * xx
 
@@ -204,7 +204,7 @@ def _follow(
     """
     down, window, left, top = np.uintp(row), np.uintp(len(gx)), 0, 0
     last_u, last_v = math.inf, math.inf
-    for iteration in range(_ITERATIONS):
+    for iteration in range(ITERATIONS):
         if iteration == 0 or math.floor(u) != left or math.floor(v) != top:
             left, top = math.floor(u), math.floor(v)
             if not _in_reach(top, left, side, image):
@@ -215,7 +215,7 @@ def _follow(
         miss_y = aim[1] - _between(sums_y, u - left, v - top)
         du, dv = inverse[0] * miss_x + inverse[1] * miss_y, inverse[1] * miss_x + inverse[2] * miss_y
         u, v = u + du, v + dv
-        if du * du + dv * dv <= _CONVERGED_PX**2:
+        if du * du + dv * dv <= CONVERGED_PX**2:
             break
         if abs(du + last_u) < _OSCILLATION_PX and abs(dv + last_v) < _OSCILLATION_PX:
             return True, u - 0.5 * du, v - 0.5 * dv

@@ -6,7 +6,6 @@ import pytest
 from numpy.typing import NDArray
 
 from config.perception import FragmentSettings
-from controller.bench import own_search
 from controller.bench.opencv_calls import OpenCvCall
 from controller.bench.own_search import recorded_searches
 from vision.fragments import lucas_kanade, optical_flow
@@ -38,13 +37,6 @@ def test_every_search_is_recorded_as_the_call_that_finds_the_same() -> None:
     there, status, _ = whole_image.execute()
     assert status.all()
     np.testing.assert_allclose(there, flow.pixels, atol=0.01)
-
-
-def test_the_call_stops_and_gives_up_where_the_own_search_does() -> None:
-    _, iterations, converged_px = own_search._CRITERIA
-    assert (iterations, converged_px) == (lucas_kanade._ITERATIONS, lucas_kanade._CONVERGED_PX)
-    least = 1024.0 * own_search._MIN_EIGENVALUE
-    assert least == pytest.approx(lucas_kanade._MIN_EIGENVALUE, rel=0.05)
 
 
 def test_afterwards_nothing_is_recorded_even_after_an_error() -> None:
