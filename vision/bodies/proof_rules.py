@@ -89,16 +89,45 @@ def arrival_of(arrived: int, arriving_s: float, cells: int, dt_s: float) -> Arri
 @inlined
 def by_fragments(filtered: Velocity, frame: Velocity, second: Opinion, ends: Ends, threshold: float) -> bool:
     """Whether filter and fragments show a velocity that the surface does not contradict, or confirms."""
-    many, some = ends.agreeing >= _ENDS_ALONG, ends.agreeing >= ENDS_ACROSS
-    across = shown_across(filtered, frame, threshold) and (some or ends.restless)
-    across = across and (not second.denies_across or many)
-    across = across and (filtered.level > _LEVEL_SHARE * threshold or many or ends.restless)
-    along = filtered.along > threshold and frame.along > 0.5 * threshold
-    along = along and many and not second.denies_along
+    return (
+        _across_the_sight(filtered, frame, second, ends, threshold)
+        or _along_the_sight(filtered, frame, second, ends, threshold)
+        or _shared_with_surface(filtered, frame, second, ends, threshold)
+    )
+
+
+@inlined
+def _across_the_sight(
+    filtered: Velocity, frame: Velocity, second: Opinion, ends: Ends, threshold: float
+) -> bool:
+    """Many ends show it by themselves. Fewer do if the motion is level and the surface does not deny it."""
+    if not shown_across(filtered, frame, threshold):
+        return False
+    if ends.agreeing >= _ENDS_ALONG:
+        return True
+    enough = ends.agreeing >= ENDS_ACROSS or ends.restless
+    level = filtered.level > _LEVEL_SHARE * threshold or ends.restless
+    return enough and level and not second.denies_across
+
+
+@inlined
+def _along_the_sight(
+    filtered: Velocity, frame: Velocity, second: Opinion, ends: Ends, threshold: float
+) -> bool:
+    """Only many ends show it, if the surface does not deny it."""
+    shown = filtered.along > threshold and frame.along > 0.5 * threshold
+    return shown and ends.agreeing >= _ENDS_ALONG and not second.denies_along
+
+
+@inlined
+def _shared_with_surface(
+    filtered: Velocity, frame: Velocity, second: Opinion, ends: Ends, threshold: float
+) -> bool:
+    """Less proof will do for a component that the surface confirms."""
     less = _SHARED_PROOF * threshold
-    shared = filtered.along > less and second.confirms_along and frame.along > _FRAME_PROOF
-    shared = shared or (filtered.across > less and second.confirms_across and frame.across > _FRAME_PROOF)
-    return across or along or (shared and (ends.agreeing >= 2 or ends.restless))
+    along = filtered.along > less and second.confirms_along and frame.along > _FRAME_PROOF
+    across = filtered.across > less and second.confirms_across and frame.across > _FRAME_PROOF
+    return (along or across) and (ends.agreeing >= 2 or ends.restless)
 
 
 @inlined
