@@ -105,7 +105,7 @@ def _manoeuvres(
         aslant_mps = max(abs(left_mps[k]), _MIN_SIDEWAYS_MPS)
         outwards, beside = left_mps[k] * d_m[k] > 0.0, clearance_m[k] > 0.0
         unaware = along_mps[k] > (along_to_side_ratio if outwards else 1.0) * aslant_mps
-        comes = along_mps[k] < -aslant_mps
+        comes = along_mps[k] < -(along_to_side_ratio if unseen_s[k] > 0.0 else 1.0) * aslant_mps
         leaves = outwards and beside and not unaware
         if moving[k]:
             # A body that turns into the way also slows down along the path.
