@@ -40,6 +40,7 @@ from controller.decision.unseen_motion import (
     velocities_agree,
     with_measured_velocity,
 )
+from controller.decision.velocity_filter import missing_to_walking
 from controller.decision.view_edges import ViewEdges, beyond_edges, out_of_view
 from hal.clocks import NS_PER_S
 from hal.compiled import compiled
@@ -57,13 +58,11 @@ _MOVING_KEPT_S, _MAY_ENTER_KEPT_S = 2.0, 6.0
 # A place this far inside the side edge of the view still counts as outside; of a mover, for each second since
 # it was last seen, this much more.
 _EDGE_TOLERANCE_M, _EDGE_TOLERANCE_MPS = 0.3, 0.15
-# An approaching mover that was not seen to come in stays at least this far from the camera's axis.
-_MIN_AXIS_DISTANCE_M = 0.1
+_MIN_AXIS_DISTANCE_M = 0.1  # least distance from the camera's axis of a mover that was not seen to come in
 # A body out of view may have changed its velocity by this much per second.
 _VELOCITY_CHANGE_MPS2 = 0.25
 _ROUNDING = 1e-6  # rounding
-# A strip this near to a kept mover may be a part of it.
-_STRIP_REACH_M = 0.5
+_STRIP_REACH_M = 0.5  # a strip this near to a kept mover may be a part of it
 
 
 class OutOfView:
@@ -86,7 +85,7 @@ class OutOfView:
         """The seen bodies, of which some that are judged standing are made moving.
 
         These are the ones that approached the robot's axis when last seen, which perception now only predicts
-        (unseen_s > 0), and whose place is out of view. They get the velocity measured last.
+        (unseen_s > 0), and whose place is out of view. They get the velocity measured last, and set off.
         """
         if not len(seen):
             self._widest_of, self._approach_velocity = seen.ids, {}
@@ -108,7 +107,9 @@ class OutOfView:
             return seen
         velocity = seen.velocity_mps.copy()
         velocity[leaves] = [self._approach_velocity[ids[k]] for k in np.flatnonzero(leaves).tolist()]
-        return replace(seen, velocity_mps=velocity, moving=seen.moving | leaves)
+        innovation = np.where(leaves[:, None], missing_to_walking(velocity), seen.innovation_mps)
+        moving = seen.moving | leaves
+        return replace(seen, velocity_mps=velocity, innovation_mps=innovation, moving=moving)
 
     def update(
         self,

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from controller.decision.bodies import Bodies
 from hal.clocks import NS_PER_S
-from hal.compiled import compiled
+from hal.compiled import compiled, inlined
 from hal.types import FloatArray
 
 # Process noise: people change their velocity by this standard deviation in one second, as a random walk (it
@@ -33,6 +33,7 @@ _NOISE_SIGMAS, _SURPRISE_GAIN = 0.5, 2.0
 _SETTING_OFF_S, _WALKING_MPS = 1.0, 1.2
 # What moves when it is first seen may have moved for long: its track must be older than its motion by this.
 _STOOD_S = 0.3
+_LEAST_MPS = 1e-3  # lower bound of a divisor
 
 
 class SteadyVelocities:
@@ -67,6 +68,21 @@ class SteadyVelocities:
         )
         self._ids, self._moving_s, self._velocity, self._variance = seen.ids, moving_s[:, 0], velocity, variance
         return replace(seen, velocity_mps=velocity, innovation_mps=innovation)
+
+
+def missing_to_walking(velocity_mps: FloatArray) -> FloatArray:
+    """(N, 2) by how much bodies that set off with velocity_mps (N, 2) may yet get faster, along the same way."""
+    return _missing_to_walking(velocity_mps)
+
+
+@inlined
+def _missing_to_walking(velocity_mps: FloatArray) -> FloatArray:
+    missing = np.zeros_like(velocity_mps)
+    for k in range(len(velocity_mps)):
+        speed_mps = max(math.hypot(velocity_mps[k, 0], velocity_mps[k, 1]), _LEAST_MPS)
+        for axis in range(2):
+            missing[k, axis] = velocity_mps[k, axis] * max(_WALKING_MPS / speed_mps - 1.0, 0.0)
+    return missing
 
 
 @compiled(
@@ -113,9 +129,8 @@ def _averaged(
             beyond_noise = max(abs(differs) - _NOISE_SIGMAS * math.sqrt(spread), 0.0)
             innovation[k, axis] = _SURPRISE_GAIN * math.copysign(beyond_noise, differs)
         if 0.0 < moving_s[k, 0] < min(_SETTING_OFF_S, tracked_s[k] - _STOOD_S):
-            speed_mps = math.hypot(velocity[k, 0], velocity[k, 1])
+            missing_mps = _missing_to_walking(velocity[k : k + 1])[0]
             for axis in range(2):
-                missing_mps = velocity[k, axis] * max(_WALKING_MPS / max(speed_mps, 1e-3) - 1.0, 0.0)
-                if abs(missing_mps) > abs(innovation[k, axis]):
-                    innovation[k, axis] = missing_mps
+                if abs(missing_mps[axis]) > abs(innovation[k, axis]):
+                    innovation[k, axis] = missing_mps[axis]
     return result
