@@ -22,7 +22,7 @@ BoolArray = NDArray[np.bool_]
 MIN_TRACKED_S = 0.5
 # A body that is judged standing counts as approaching if it is faster than both thresholds. Noise makes
 # standing things beside the view seem to creep now and then; lower thresholds would slow the robot each time.
-_APPROACH_MIN_SIGMAS, _APPROACH_MIN_MPS = 2.5, 0.2
+_APPROACH_MIN_SIGMAS, _APPROACH_MIN_MPS = 3.3, 0.2
 # No person or vehicle is as narrow as this, but ends of racks are. Half of the greatest width that was seen.
 MIN_MOVER_HALF_WIDTH_M = 0.1
 # A speed above this many standard deviations is certain: the body will not be found where it was last seen.
