@@ -1,4 +1,7 @@
-"""Remembered standing bodies just inside the edge of the view whose place a standing robot sees to be empty.
+"""Whether the place of a standing body that has gone missing is seen: empty, or with a surface in it.
+
+A body that goes missing in the middle of the view is kept while its place is not seen (unproven). Something
+thin is measured in some frames only, and somebody may walk by before it.
 
 People and vehicles that pass leave narrow tracks behind that were judged standing for a moment. Just inside
 the edge of the view controller/decision/out_of_view.py keeps them, since what is there may be just outside. A
@@ -24,6 +27,10 @@ _WELL_INSIDE_M = 0.05
 # The place must be seen empty in every scene for this long. Noise does not see through a body for half of
 # that, and a robot that would otherwise wait without end loses nothing.
 _FOR_NS = 500_000_000
+# Beyond this distance, depth is too often missing to conclude anything from that.
+_NEAR_M = 5.0
+# A surface within this distance of the place may be what stood there. From then on depth tells of it.
+_AT_PLACE_M = 0.3
 # A robot that turns by more than this does not stand: turning in place sweeps the edges of the view.
 _STANDS_RAD = math.radians(0.25)
 
@@ -48,31 +55,60 @@ class SeenThrough:
             self.forget()
             self._heading_rad = pose.heading_rad
         now_ns = bodies.captured_ns
-        cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
-        offset = bodies.xy_m - (pose.x_m, pose.y_m)
-        ahead = offset @ (cos, sin) - self._mount.forward_m
-        right = self._mount.left_m - offset @ (-sin, cos)
+        ahead, right = _in_camera(bodies, pose, self._mount)
         near, far = ahead - bodies.half_view_m, ahead + bodies.half_view_m
         in_view = ~bodies.moving & (near > 0.0)
         in_view &= ~beyond_edges(bodies, near, self._mount.height_m, edges)
         in_view &= np.abs(right) + bodies.half_across_m <= edges.edge_tan * near - _WELL_INSIDE_M
         ids, since_ns = bodies.ids.tolist(), {}
         for k in in_view.nonzero()[0].tolist():
-            edges_m = right[k] + np.array([-1.0, 1.0]) * bodies.half_across_m[k]
-            if _is_free(free, edges_m, float(near[k]), float(far[k])):
+            bands = _bands(free, right[k], float(bodies.half_across_m[k]), float(near[k]), float(far[k]))
+            if _is_free(free, bands, float(far[k])):
                 since_ns[ids[k]] = self._since_ns.get(ids[k], now_ns)
         self._since_ns = since_ns
         return np.array([now_ns - since_ns.get(track_id, now_ns) >= _FOR_NS for track_id in ids], np.bool_)
 
 
-def _is_free(free: FreeSpace, edges_m: FloatArray, near_m: float, far_m: float) -> bool:
-    """Whether all bands that a body covers are seen free beyond far_m; what is not known is not free.
+def unproven(
+    bodies: Bodies, pose: PlanarPose, mount: CameraMount, edges: ViewEdges, free: FreeSpace
+) -> NDArray[np.bool_]:
+    """(N,) which standing bodies are in view and near, but their place is not seen in this scene.
 
-    edges_m (2,): its left and right edge, as distances to the right. near_m, far_m: its faces, ahead.
+    It is seen if every band that the body covers is free beyond it, or if one of them ends at a surface there.
     """
+    ahead, right = _in_camera(bodies, pose, mount)
+    near, far = ahead - bodies.half_view_m, ahead + bodies.half_view_m
+    asked = ~bodies.moving & (near > 0.0) & (near <= _NEAR_M)
+    asked &= ~beyond_edges(bodies, near, mount.height_m, edges)
+    unseen = np.zeros(len(bodies), np.bool_)
+    for k in asked.nonzero()[0].tolist():
+        bands = _bands(free, right[k], float(bodies.half_across_m[k]), float(near[k]), float(far[k]))
+        nearest = free.nearest_m[bands]
+        there = (nearest >= near[k] - _AT_PLACE_M) & (nearest < far[k] + _AT_PLACE_M)
+        unseen[k] = len(nearest) > 0 and not (there.any() or _is_free(free, bands, float(far[k])))
+    return unseen
+
+
+def _in_camera(bodies: Bodies, pose: PlanarPose, mount: CameraMount) -> tuple[FloatArray, FloatArray]:
+    """(N,) each: how far ahead and to the right of the camera the centres are."""
+    cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
+    offset = bodies.xy_m - (pose.x_m, pose.y_m)
+    return offset @ (cos, sin) - mount.forward_m, mount.left_m - offset @ (-sin, cos)
+
+
+def _bands(
+    free: FreeSpace, right_m: float, half_across_m: float, near_m: float, far_m: float
+) -> NDArray[np.bool_]:
+    """(B,) which bands a body covers, from its left to its right edge, at its near and its far face."""
+    edges_m = right_m + np.array([-half_across_m, half_across_m])
     tans = np.concatenate((edges_m / near_m, edges_m / far_m))
-    bands = (free.bearing_tan >= tans.min() - free.half_width_tan) & (
+    covered: NDArray[np.bool_] = (free.bearing_tan >= tans.min() - free.half_width_tan) & (
         free.bearing_tan <= tans.max() + free.half_width_tan
     )
+    return covered
+
+
+def _is_free(free: FreeSpace, bands: NDArray[np.bool_], far_m: float) -> bool:
+    """Whether all of the bands (B,) are seen free beyond far_m; what is not known is not free."""
     seen = (free.known_m[bands] >= far_m) & (free.nearest_m[bands] >= far_m)
     return len(seen) > 0 and bool(seen.all())

@@ -66,12 +66,17 @@ class SteadyVelocities:
             self._variance,
             dt_s,
         )
-        self._ids, self._moving_s, self._velocity, self._variance = seen.ids, moving_s[:, 0], velocity, variance
+        self._ids, self._moving_s, self._velocity, self._variance = (
+            seen.ids,
+            moving_s[:, 0],
+            velocity,
+            variance,
+        )
         return replace(seen, velocity_mps=velocity, innovation_mps=innovation)
 
 
 def missing_to_walking(velocity_mps: FloatArray) -> FloatArray:
-    """(N, 2) by how much bodies that set off with velocity_mps (N, 2) may yet get faster, along the same way."""
+    """(N, 2) how much faster bodies that set off with velocity_mps (N, 2) may become, in the same direction."""
     return _missing_to_walking(velocity_mps)
 
 
