@@ -5,8 +5,8 @@ body of the last scene that is missing in this one is kept while its place is no
 
 * Standing (seen for at least 0.5 s; the robot drives): kept where it was, until its place is seen again (free
   or with a surface in it), a seen body covers it, or it lies 2 m behind the camera. If it goes missing while
-  the robot stands, it has moved away itself: dropped. If it is kept just inside the side edge of the view: dropped once a standing
-  robot sees through its place (controller/decision/seen_through.py).
+  the robot stands, it has moved away itself: dropped. If it is kept just inside the side edge of the view:
+  dropped once a standing robot sees through its place (controller/decision/seen_through.py).
 * Moving: extrapolated with its last velocity for 2 s, or for 6 s if that leads towards the robot's axis or
   along with the robot. Dropped earlier if its place is well within the view or 2 m behind the camera.
 * Judged standing (a verdict takes some frames), but clearly measured as approaching (or as moving anywhere,

@@ -74,7 +74,7 @@ def unproven(
 ) -> NDArray[np.bool_]:
     """(N,) which standing bodies are in view and near, but their place is not seen in this scene.
 
-    It is seen if every band that the body covers is free beyond it, or if one of them ends at a surface there.
+    It is seen if every band that the body covers is free beyond it, or if one ends at a surface there.
     """
     ahead, right = _in_camera(bodies, pose, mount)
     near, far = ahead - bodies.half_view_m, ahead + bodies.half_view_m

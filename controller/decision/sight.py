@@ -217,8 +217,8 @@ def _surfaces_in_corridor(
 
     Returns in which of the B bands a surface is in the corridor (B,); the least s_m of such a surface that
     belongs to no body, inf if there is none; the free floor between that one and the corridor; which
-    surfaces (P,) belong to no mover. belongs (P, N): which surfaces belong to which bodies. moving (N,): which
-    bodies move.
+    surfaces (P,) belong to no mover. belongs (P, N): which surfaces belong to which bodies. moving (N,):
+    which bodies move.
     """
     in_corridor, stands = np.zeros(bands_count, np.bool_), np.ones(len(bands), np.bool_)
     nearest_s = clearance_m = math.inf

@@ -76,7 +76,7 @@ class SteadyVelocities:
 
 
 def missing_to_walking(velocity_mps: FloatArray) -> FloatArray:
-    """(N, 2) how much faster bodies that set off with velocity_mps (N, 2) may become, in the same direction."""
+    """(N, 2) how much faster bodies that set off with velocity_mps (N, 2) may become, straight on."""
     return _missing_to_walking(velocity_mps)
 
 
