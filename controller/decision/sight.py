@@ -38,6 +38,7 @@ _MAX_ABOVE_M = 3.0
 _FRAMES = 5
 # A surface that recedes by more than this has left the view; less is depth noise.
 _RECEDES_M = 0.05
+_SAME_SURFACE_M = 0.3  # how much farther along the path points of the nearest surface may be
 
 
 class Sight:
@@ -222,6 +223,7 @@ def _surfaces_in_corridor(
     """
     in_corridor, stands = np.zeros(bands_count, np.bool_), np.ones(len(bands), np.bool_)
     nearest_s = clearance_m = math.inf
+    counts = np.zeros(len(bands), np.bool_)
     for i in range(len(bands)):
         explained = False
         for k in range(len(moving)):
@@ -231,8 +233,13 @@ def _surfaces_in_corridor(
         aside_m = abs(surface_d_m[i]) - half_band_m[i]
         if aside_m <= half_width_m[i] + lateral_m and surface_s_m[i] > s_m:
             in_corridor[bands[i]] = True
-            if not explained and surface_s_m[i] < nearest_s:
-                nearest_s, clearance_m = surface_s_m[i], aside_m - half_width_m[i]
+            if not explained:
+                counts[i] = True
+                nearest_s = min(nearest_s, surface_s_m[i])
+    for i in counts.nonzero()[0]:
+        # A wall across the way begins beside it.
+        if surface_s_m[i] <= nearest_s + _SAME_SURFACE_M:
+            clearance_m = min(clearance_m, abs(surface_d_m[i]) - half_band_m[i] - half_width_m[i])
     return in_corridor, nearest_s, clearance_m, stands
 
 

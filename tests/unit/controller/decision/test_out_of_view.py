@@ -194,7 +194,7 @@ def test_who_walks_away_is_not() -> None:
     assert kept == []
 
 
-@pytest.mark.parametrize(("aside_mps", "kept"), [(0.1, [1]), (0.35, [])])
+@pytest.mark.parametrize(("aside_mps", "kept"), [(0.1, [1]), (0.2, []), (0.35, [])])
 def test_who_goes_along_but_leaves_aslant_is_not_either(aside_mps: float, kept: list[int]) -> None:
     """After 4 s: who goes almost along the path could still cut in."""
     recall = Recall()
