@@ -236,9 +236,9 @@ def _surfaces_in_corridor(
             if not explained:
                 counts[i] = True
                 nearest_s = min(nearest_s, surface_s_m[i])
-    for i in counts.nonzero()[0]:
+    for i in range(len(bands)):
         # A wall across the way begins beside it.
-        if surface_s_m[i] <= nearest_s + _SAME_SURFACE_M:
+        if counts[i] and surface_s_m[i] <= nearest_s + _SAME_SURFACE_M:
             clearance_m = min(clearance_m, abs(surface_d_m[i]) - half_band_m[i] - half_width_m[i])
     return in_corridor, nearest_s, clearance_m, stands
 
