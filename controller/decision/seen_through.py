@@ -79,8 +79,10 @@ def unproven(
     ahead, right = _in_camera(bodies, pose, mount)
     near, far = ahead - bodies.half_view_m, ahead + bodies.half_view_m
     asked = ~bodies.moving & (near > 0.0) & (near <= _NEAR_M)
-    asked &= ~beyond_edges(bodies, near, mount.height_m, edges)
     unseen = np.zeros(len(bodies), np.bool_)
+    if not asked.any():
+        return unseen
+    asked &= ~beyond_edges(bodies, near, mount.height_m, edges)
     for k in asked.nonzero()[0].tolist():
         bands = _bands(free, right[k], float(bodies.half_across_m[k]), float(near[k]), float(far[k]))
         nearest = free.nearest_m[bands]
