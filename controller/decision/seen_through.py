@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from controller.decision.bodies import Bodies
 from controller.decision.view_edges import ViewEdges, beyond_edges
+from hal.compiled import compiled
 from hal.geometry import wrap_angle_rad
 from hal.types import CameraMount, FloatArray, PlanarPose
 from vision.scene import FreeSpace
@@ -76,18 +77,24 @@ def unproven(
 
     It is seen if every band that the body covers is free beyond it, or if one ends at a surface there.
     """
-    ahead, right = _in_camera(bodies, pose, mount)
-    near, far = ahead - bodies.half_view_m, ahead + bodies.half_view_m
-    asked = ~bodies.moving & (near > 0.0) & (near <= _NEAR_M)
-    unseen = np.zeros(len(bodies), np.bool_)
-    if not asked.any():
-        return unseen
-    asked &= ~beyond_edges(bodies, near, mount.height_m, edges)
-    for k in asked.nonzero()[0].tolist():
-        bands = _bands(free, right[k], float(bodies.half_across_m[k]), float(near[k]), float(far[k]))
-        nearest = free.nearest_m[bands]
-        there = (nearest >= near[k] - _AT_PLACE_M) & (nearest < far[k] + _AT_PLACE_M)
-        unseen[k] = len(nearest) > 0 and not (there.any() or _is_free(free, bands, float(far[k])))
+    unseen = _unproven(
+        bodies.xy_m,
+        bodies.half_view_m,
+        bodies.half_across_m,
+        bodies.moving,
+        pose.x_m,
+        pose.y_m,
+        pose.heading_rad,
+        mount.forward_m,
+        mount.left_m,
+        free.bearing_tan,
+        free.half_width_tan,
+        free.nearest_m,
+        free.known_m,
+    )
+    if np.count_nonzero(unseen):
+        ahead, _ = _in_camera(bodies, pose, mount)
+        unseen &= ~beyond_edges(bodies, ahead - bodies.half_view_m, mount.height_m, edges)
     return unseen
 
 
@@ -114,3 +121,44 @@ def _is_free(free: FreeSpace, bands: NDArray[np.bool_], far_m: float) -> bool:
     """Whether all of the bands (B,) are seen free beyond far_m; what is not known is not free."""
     seen = (free.known_m[bands] >= far_m) & (free.nearest_m[bands] >= far_m)
     return len(seen) > 0 and bool(seen.all())
+
+
+@compiled(
+    "float64[:, :], float64[:], float64[:], boolean[:], float64, float64, float64, float64, float64,"
+    "float64[:], float64, float64[:], float64[:]"
+)
+def _unproven(
+    xy_m: FloatArray,
+    half_view_m: FloatArray,
+    half_across_m: FloatArray,
+    moving: NDArray[np.bool_],
+    x_m: float,
+    y_m: float,
+    heading_rad: float,
+    forward_m: float,
+    left_m: float,
+    bearing_tan: FloatArray,
+    half_width_tan: float,
+    nearest_m: FloatArray,
+    known_m: FloatArray,
+) -> NDArray[np.bool_]:
+    """unproven() in arrays, but for bodies below or above the view."""
+    cos, sin = math.cos(heading_rad), math.sin(heading_rad)
+    unseen = np.zeros(len(xy_m), np.bool_)
+    for k in range(len(xy_m)):
+        dx, dy = xy_m[k, 0] - x_m, xy_m[k, 1] - y_m
+        ahead, right = dx * cos + dy * sin - forward_m, left_m - (dy * cos - dx * sin)
+        near, far = ahead - half_view_m[k], ahead + half_view_m[k]
+        if moving[k] or not 0.0 < near <= _NEAR_M:
+            continue
+        left_edge, right_edge = right - half_across_m[k], right + half_across_m[k]
+        first = min(left_edge / near, left_edge / far) - half_width_tan
+        last = max(right_edge / near, right_edge / far) + half_width_tan
+        covered, free, there = 0, 0, False
+        for b in range(len(bearing_tan)):
+            if first <= bearing_tan[b] <= last:
+                covered += 1
+                free += int(known_m[b] >= far and nearest_m[b] >= far)
+                there |= near - _AT_PLACE_M <= nearest_m[b] < far + _AT_PLACE_M
+        unseen[k] = covered > 0 and not there and free < covered
+    return unseen
