@@ -28,10 +28,12 @@ _CORRELATED_S = 0.25
 # counts twice: the body is still changing its velocity, and before the robot reacts it will have changed once
 # more by as much as the average lags behind.
 _NOISE_SIGMAS, _SURPRISE_GAIN = 0.5, 2.0
-# Somebody who was seen standing and sets off is measured late and accelerates for about a second, up to a
-# walking speed. Until then the speed that is still missing counts as surprise.
+# A body that was seen standing and sets off is measured late, and accelerates for about a second up to a
+# walking speed. For that time innovation_mps is at least what is missing to that speed. Most people who ever
+# walked into the robot's side had set off as they left the view, measured at a third of their later speed.
 _SETTING_OFF_S, _WALKING_MPS = 1.0, 1.2
-# What moves when it is first seen may have moved for long: its track must be older than its motion by this.
+# A body that moves when it is first seen may have moved for long. So the track must be older than the motion
+# by this.
 _STOOD_S = 0.3
 _LEAST_MPS = 1e-3  # lower bound of a divisor
 
