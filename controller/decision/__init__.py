@@ -7,11 +7,11 @@ The files in the order of one control step:
 * world_model.py - takes in each new scene with the files from here to blind_corners.py; judges the camera
 * bodies.py - obstacles as boxes on the floor
 * surfaces.py - the free space as points on the floor
-* velocity_filter.py - averages the measured velocities
+* velocity_filter.py - averages the measured velocities; how fast those who set off may become
 * out_of_view.py - keeps bodies that have left the view
 * unseen_motion.py - which of them move, and with which velocity
 * view_edges.py - what is below, above or beside the view
-* seen_through.py - drops remembered bodies whose place is seen empty
+* seen_through.py - whether the place of a body that went missing is seen, and seen empty
 * lens_cover.py - whether something covers the lens
 * corridor.py - the swept width along the path, and bodies in path coordinates
 * sight.py - how far the corridor was seen free, and unexplained surfaces in it

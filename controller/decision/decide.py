@@ -138,7 +138,9 @@ class DecisionMaker:
         let_go_mps = max(motion.v_mps - motion.a_mps2**2 / (2.0 * self._comfort.jerk_mps3), 0.0)
         if raw_mps < min(top_mps, on_way.speed_mps):
             self._last = watched = _reason_for(least, raw_mps)
-        released_mps = 0.0 if waits else min(raw_mps, top_mps)
+        # Something that comes and goes does not stop a robot that still rolls, but lets it get no faster.
+        rolling_mps = let_go_mps if let_go_mps >= self._config.release.creep_mps else 0.0
+        released_mps = min(raw_mps, rolling_mps if waits else top_mps)
         gated_mps = self._gate.step(released_mps, motion.v_mps, let_go_mps, now_ns, on_way.speed_mps)
         target_mps = min(gated_mps, on_way.speed_mps)
         if on_way.speed_mps <= gated_mps:

@@ -118,6 +118,16 @@ def stop_before(
     return Limit(speed, why, urgent=motion.v_mps > 0.0 and spare < min_left_m - margin_m)
 
 
+def standing_text(clearance_m: float, needed_m: float) -> str:
+    """What something that stands does, for a reason: beside the swept width, how much room it leaves there.
+
+    clearance_m: free floor between it and the swept width. needed_m: from how much on it is passed.
+    """
+    if not 0.0 < clearance_m < math.inf:
+        return "stands on the path"
+    return f"leaves {clearance_m:.2f} m beside the swept width, which needs {needed_m:.2f} m,"
+
+
 def speed_to_decide_by(commanded_mps: float, measured_mps: float) -> float:
     """The greater of commanded and measured speed: braking for speed that is not there does less harm.
 

@@ -102,10 +102,11 @@ def _manoeuvres(
         # unaware: goes in the robot's direction, so it does not see the robot coming and is beside it for
         # long. comes: comes towards the robot, sees it after a while and keeps its lane. leaves: moves away
         # from the path. All but comes and leaves may have changed their velocity since they left the view.
+        # Out of view it cannot be seen to keep its lane, so there it must come nearly straight.
         aslant_mps = max(abs(left_mps[k]), _MIN_SIDEWAYS_MPS)
         outwards, beside = left_mps[k] * d_m[k] > 0.0, clearance_m[k] > 0.0
         unaware = along_mps[k] > (along_to_side_ratio if outwards else 1.0) * aslant_mps
-        comes = along_mps[k] < -aslant_mps
+        comes = along_mps[k] < -(along_to_side_ratio if unseen_s[k] > 0.0 else 1.0) * aslant_mps
         leaves = outwards and beside and not unaware
         if moving[k]:
             # A body that turns into the way also slows down along the path.

@@ -1,12 +1,12 @@
 """Bodies that have left the camera's view but are still there: below, beside or above it.
 
 controller/decision/world_model.py calls OutOfView.mark_leaving_movers, then OutOfView.update, once a scene. A
-body of the last scene that is missing in this one is kept while its place is outside the view:
+body of the last scene that is missing in this one is kept while its place is not seen:
 
-* Standing (seen for at least 0.5 s; the robot drives): kept where it was, until its place is in view again,
-  a seen body covers it, or it lies 2 m behind the camera. If it goes missing while the robot stands, it has
-  moved away itself: dropped. If it is kept just inside the side edge of the view: dropped once a standing
-  robot sees through its place (controller/decision/seen_through.py).
+* Standing (seen for at least 0.5 s; the robot drives): kept where it was, until its place is seen again (free
+  or with a surface in it), a seen body covers it, or it lies 2 m behind the camera. If it goes missing while
+  the robot stands, it has moved away itself: dropped. If it is kept just inside the side edge of the view:
+  dropped once a standing robot sees through its place (controller/decision/seen_through.py).
 * Moving: extrapolated with its last velocity for 2 s, or for 6 s if that leads towards the robot's axis or
   along with the robot. Dropped earlier if its place is well within the view or 2 m behind the camera.
 * Judged standing (a verdict takes some frames), but clearly measured as approaching (or as moving anywhere,
@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.decision.bodies import Bodies, no_bodies
-from controller.decision.seen_through import SeenThrough
+from controller.decision.seen_through import SeenThrough, unproven
 from controller.decision.unseen_motion import (
     MIN_MOVER_HALF_WIDTH_M,
     MIN_TRACKED_S,
@@ -40,6 +40,7 @@ from controller.decision.unseen_motion import (
     velocities_agree,
     with_measured_velocity,
 )
+from controller.decision.velocity_filter import missing_to_walking
 from controller.decision.view_edges import ViewEdges, beyond_edges, out_of_view
 from hal.clocks import NS_PER_S
 from hal.compiled import compiled
@@ -57,13 +58,11 @@ _MOVING_KEPT_S, _MAY_ENTER_KEPT_S = 2.0, 6.0
 # A place this far inside the side edge of the view still counts as outside; of a mover, for each second since
 # it was last seen, this much more.
 _EDGE_TOLERANCE_M, _EDGE_TOLERANCE_MPS = 0.3, 0.15
-# An approaching mover that was not seen to come in stays at least this far from the camera's axis.
-_MIN_AXIS_DISTANCE_M = 0.1
+_MIN_AXIS_DISTANCE_M = 0.1  # least distance from the camera's axis of a mover that was not seen to come in
 # A body out of view may have changed its velocity by this much per second.
 _VELOCITY_CHANGE_MPS2 = 0.25
-_ROUNDING = 1e-6  # rounding
-# A strip this near to a kept mover may be a part of it.
-_STRIP_REACH_M = 0.5
+_ROUNDING = 1e-6
+_STRIP_REACH_M = 0.5  # a strip this near to a kept mover may be a part of it
 
 
 class OutOfView:
@@ -86,7 +85,7 @@ class OutOfView:
         """The seen bodies, of which some that are judged standing are made moving.
 
         These are the ones that approached the robot's axis when last seen, which perception now only predicts
-        (unseen_s > 0), and whose place is out of view. They get the velocity measured last.
+        (unseen_s > 0), and whose place is out of view. They get the velocity measured last, and set off.
         """
         if not len(seen):
             self._widest_of, self._approach_velocity = seen.ids, {}
@@ -108,7 +107,9 @@ class OutOfView:
             return seen
         velocity = seen.velocity_mps.copy()
         velocity[leaves] = [self._approach_velocity[ids[k]] for k in np.flatnonzero(leaves).tolist()]
-        return replace(seen, velocity_mps=velocity, moving=seen.moving | leaves)
+        innovation = np.where(leaves[:, None], missing_to_walking(velocity), seen.innovation_mps)
+        moving = seen.moving | leaves
+        return replace(seen, velocity_mps=velocity, innovation_mps=innovation, moving=moving)
 
     def update(
         self,
@@ -133,7 +134,8 @@ class OutOfView:
         some_move = np.count_nonzero(bodies.moving) > 0
         xy_m = self._extrapolated(bodies, dt_s, pose) if some_move else bodies.xy_m
         bodies = bodies.moved_to(seen.captured_ns, xy_m, bodies.unseen_s + dt_s)
-        kept = self._still_out_of_view(bodies, since_s, seen, pose, edges)
+        out = self._outside_view(bodies, pose, edges) | unproven(bodies, pose, self._mount, edges, free)
+        kept = self._still_there(bodies, since_s, seen, out, pose)
         if standing:
             kept &= ~self._seen_through.seen_empty(bodies, pose, edges, free)
         else:
@@ -159,21 +161,20 @@ class OutOfView:
         gone = gone.select(gone.moving | ((gone.age_s >= MIN_TRACKED_S) & (not standing)))
         return bodies.joined(gone), np.concatenate((since_s, np.full(len(gone), dt_s)))
 
-    def _still_out_of_view(
-        self, bodies: Bodies, since_s: FloatArray, seen: Bodies, pose: PlanarPose, edges: ViewEdges
+    def _still_there(
+        self, bodies: Bodies, since_s: FloatArray, seen: Bodies, out: BoolArray, pose: PlanarPose
     ) -> BoolArray:
-        """(N,) which bodies, last seen since_s ago (N,), are outside the view and not part of a seen one.
+        """(N,) which bodies, last seen since_s ago (N,), are out of view (N,) and not part of a seen one.
 
         Movers are kept for a limited time only.
         """
         part_of = seen.covers(bodies.xy_m, bodies.half_view_m, _SAME_PLACE_M)
-        outside = self._outside_view(bodies, pose, edges)
         if not np.count_nonzero(bodies.moving):
-            return _still_kept(outside, part_of, bodies.ids, seen.ids)
+            return _still_kept(out, part_of, bodies.ids, seen.ids)
         part_of &= velocities_agree(bodies, seen) | ~bodies.moving[:, None]
         kept_s = np.where(may_enter_way(bodies, pose), _MAY_ENTER_KEPT_S, _MOVING_KEPT_S)
-        outside &= ~bodies.moving | (since_s <= kept_s)
-        kept = _still_kept(outside, part_of, bodies.ids, seen.ids)
+        timely = ~bodies.moving | (since_s <= kept_s)
+        kept = _still_kept(out & timely, part_of, bodies.ids, seen.ids)
         return kept & ~_leftover_strips(bodies, kept)
 
     def _extrapolated(self, bodies: Bodies, dt_s: float, pose: PlanarPose) -> FloatArray:

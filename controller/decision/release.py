@@ -21,7 +21,10 @@ _GONE_S = 1.0
 
 
 class StartDelay:
-    """Keeps the target at zero for _GONE_S after something that comes and goes stood in the way."""
+    """Keeps a standing robot at rest for _GONE_S after something that comes and goes stood in its way.
+
+    A robot that still rolls is not stopped by it: it only gets no faster meanwhile.
+    """
 
     def __init__(self) -> None:
         self._stood_ns: int | None = None
@@ -29,7 +32,7 @@ class StartDelay:
         self._flickers = False
 
     def step(self, blocked: bool, stands: bool, now_ns: int) -> bool:
-        """Whether the robot must not start yet.
+        """Whether the robot must not start, or get faster, yet.
 
         blocked: something makes it stand. stands: that does not move. Something that is in the way until it
         leaves, first standing and then moving, has not come back.

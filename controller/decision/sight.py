@@ -40,6 +40,7 @@ _BEYOND_RANGE_M = 2.0
 _FRAMES = 5
 # A surface that recedes by more than this has left the view; less is depth noise.
 _RECEDES_M = 0.05
+_SAME_SURFACE_M = 0.3  # how much farther along the path points of the nearest surface may be
 
 
 class Sight:
@@ -47,6 +48,7 @@ class Sight:
 
     surface_s_m: path coordinate of the nearest unexplained surface in the corridor, filtered over some
     scenes; inf: none.
+    surface_clearance_m: free floor between that surface and the corridor; 0 or less: inside it.
     known_s_m: the corridor was seen free up to here.
     corners: the blind corners, where somebody could step out (controller/decision/blind_corners.py).
     """
@@ -67,7 +69,7 @@ class Sight:
         self._assumed_free_s_m = start_s_m + mount.forward_m + self._near_m + _CELL_M
         self._nearest: deque[float] = deque(maxlen=_FRAMES)
         self._held_s_m = self._closest_s_m = math.inf
-        self.surface_s_m = math.inf
+        self.surface_s_m = self.surface_clearance_m = math.inf
         self.known_s_m = self._assumed_free_s_m
         self.corners = BlindCorners(config.sight)
 
@@ -89,7 +91,7 @@ class Sight:
         """
         self._update_view_edges(free)
         on_path = self._on_path(surfaces, s_m)
-        in_corridor, nearest_s, stands = _surfaces_in_corridor(
+        in_corridor, nearest_s, clearance_m, stands = _surfaces_in_corridor(
             on_path.bands,
             on_path.s_m,
             on_path.d_m,
@@ -102,6 +104,8 @@ class Sight:
             len(free.bearing_tan),
         )
         self.corners.look(on_path, stands, 2.0 * free.half_width_tan, s_m + self._corridor.front_m)
+        if nearest_s < math.inf:
+            self.surface_clearance_m = clearance_m
         self._note_surface(nearest_s, s_m, standing)
         self._note_floor(free, pose, s_m, captured_ns, in_corridor)
 
@@ -204,15 +208,17 @@ def _surfaces_in_corridor(
     s_m: float,
     lateral_m: float,
     bands_count: int,
-) -> tuple[BoolArray, float, BoolArray]:
+) -> tuple[BoolArray, float, float, BoolArray]:
     """Which surfaces are in the corridor, and which of them bodies explain.
 
     Returns in which of the B bands a surface is in the corridor (B,); the least s_m of such a surface that
-    belongs to no body, inf if there is none; which surfaces (P,) belong to no mover. belongs (P, N): which
-    surfaces belong to which bodies. moving (N,): which bodies move.
+    belongs to no body, inf if there is none; the free floor between that one and the corridor; which
+    surfaces (P,) belong to no mover. belongs (P, N): which surfaces belong to which bodies. moving (N,):
+    which bodies move.
     """
     in_corridor, stands = np.zeros(bands_count, np.bool_), np.ones(len(bands), np.bool_)
-    nearest_s = math.inf
+    nearest_s = clearance_m = math.inf
+    counts = np.zeros(len(bands), np.bool_)
     for i in range(len(bands)):
         explained = False
         for k in range(len(moving)):
@@ -223,8 +229,13 @@ def _surfaces_in_corridor(
         if aside_m <= half_width_m[i] + lateral_m and surface_s_m[i] > s_m:
             in_corridor[bands[i]] = True
             if not explained:
+                counts[i] = True
                 nearest_s = min(nearest_s, surface_s_m[i])
-    return in_corridor, nearest_s, stands
+    for i in range(len(bands)):
+        # A wall across the way begins beside it.
+        if counts[i] and surface_s_m[i] <= nearest_s + _SAME_SURFACE_M:
+            clearance_m = min(clearance_m, abs(surface_d_m[i]) - half_band_m[i] - half_width_m[i])
+    return in_corridor, nearest_s, clearance_m, stands
 
 
 @compiled("float64[:], float64, float64")

@@ -32,7 +32,7 @@ from controller.decision.bodies import Bodies
 from controller.decision.corridor import place
 from controller.decision.decision import Reason
 from controller.decision.lens_cover import COVERED
-from controller.decision.limits import Gap, Limit, Motion, allowed_text, stop_before
+from controller.decision.limits import Gap, Limit, Motion, allowed_text, standing_text, stop_before
 from controller.decision.moving_limits import MovingLimits
 from controller.decision.standing_limits import StandingLimits
 from controller.decision.watched import Watch
@@ -112,8 +112,10 @@ class SpeedLimits:
         """
         margins, ahead_m = self._config.margins, surface_s_m - (s_m + known.corridor.front_m)
 
+        what = standing_text(known.sight.surface_clearance_m, margins.lateral_m)
+
         def before(gap: Gap) -> Limit:
-            return stop_before(gap, motion, self._comfort, margins.stop_m, margins.least_m, "depth", "stands")
+            return stop_before(gap, motion, self._comfort, margins.stop_m, margins.least_m, "depth", what)
 
         def why() -> Reason:
             return before(Gap(ahead_m, obstacle_id=_owner(known, surface_s_m, s_m))).reason

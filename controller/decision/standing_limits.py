@@ -16,7 +16,7 @@ from config.robot import Limits
 from controller import braking
 from controller.decision.bodies import Bodies
 from controller.decision.corridor import Corridor, Placed, place
-from controller.decision.limits import ALONGSIDE_M, Gap, Limit, Motion, stop_before
+from controller.decision.limits import ALONGSIDE_M, Gap, Limit, Motion, standing_text, stop_before
 from controller.decision.outline import outline_of
 from controller.decision.view_edges import visible_from_m
 from controller.decision.world_model import WorldModel
@@ -89,7 +89,7 @@ class StandingLimits:
             if self._may_wait(gap, motion, near.age_s):
                 continue
             self._inside.add(track_id)
-            what = "stands on the path"
+            what = standing_text(near.clearance_m, margins.lateral_m + margins.graze_m)
             found.append(
                 stop_before(gap, motion, self._comfort, near.stop_m, margins.least_m, "static", what)
             )

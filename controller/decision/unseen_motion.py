@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.decision.bodies import Bodies
-from controller.decision.limits import ALONG_TO_SIDE_RATIO
 from hal.compiled import compiled
 from hal.types import FloatArray, PlanarPose
 
@@ -29,6 +28,9 @@ MIN_MOVER_HALF_WIDTH_M = 0.1
 # But perception also judges whether a track moves, which takes some frames. From this age on, its verdict
 # "standing" is trusted more than the velocity: a body that sinks below the view may well seem to move.
 _SURE_MOVE_SIGMAS, _VERDICT_TRUSTED_S = 5.0, 1.0
+# A body out of view that moves away from the robot's axis may cut in only if it goes along with the robot: if
+# its speed forward is more than this many times its speed outwards. Otherwise it has turned off.
+_ALONG_TO_OUTWARD_RATIO = 4.0
 # Velocities that differ by more standard deviations than this belong to two different bodies.
 _SAME_VELOCITY_SIGMAS = 2.0
 
@@ -67,13 +69,13 @@ def may_enter_way(bodies: Bodies, pose: PlanarPose) -> BoolArray:
     """(N,) which bodies may come into the robot's way.
 
     That is, they move towards the robot's axis from either side, or along with the robot (more than
-    ALONG_TO_SIDE_RATIO times as fast forward as sideways), from where one may cut in.
+    _ALONG_TO_OUTWARD_RATIO times as fast forward as outwards), from where one may cut in.
     """
     cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
     left = (bodies.xy_m[:, 1] - pose.y_m) * cos - (bodies.xy_m[:, 0] - pose.x_m) * sin
     leftward = bodies.velocity_mps[:, 1] * cos - bodies.velocity_mps[:, 0] * sin
     forward = bodies.velocity_mps[:, 0] * cos + bodies.velocity_mps[:, 1] * sin
-    comes: BoolArray = (left * leftward < 0.0) | (forward > ALONG_TO_SIDE_RATIO * np.abs(leftward))
+    comes: BoolArray = (left * leftward < 0.0) | (forward > _ALONG_TO_OUTWARD_RATIO * np.abs(leftward))
     return comes
 
 

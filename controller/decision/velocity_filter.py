@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from controller.decision.bodies import Bodies
 from hal.clocks import NS_PER_S
-from hal.compiled import compiled
+from hal.compiled import compiled, inlined
 from hal.types import FloatArray
 
 # Process noise: people change their velocity by this standard deviation in one second, as a random walk (it
@@ -28,6 +28,14 @@ _CORRELATED_S = 0.25
 # counts twice: the body is still changing its velocity, and before the robot reacts it will have changed once
 # more by as much as the average lags behind.
 _NOISE_SIGMAS, _SURPRISE_GAIN = 0.5, 2.0
+# A body that was seen standing and sets off is measured late, and accelerates for about a second up to a
+# walking speed. For that time innovation_mps is at least what is missing to that speed. Most people who ever
+# walked into the robot's side had set off as they left the view, measured at a third of their later speed.
+_SETTING_OFF_S, _WALKING_MPS = 1.0, 1.2
+# A body that moves when it is first seen may have moved for long. So the track must be older than the motion
+# by this.
+_STOOD_S = 0.3
+_LEAST_MPS = 1e-3  # lower bound of a divisor
 
 
 class SteadyVelocities:
@@ -35,7 +43,7 @@ class SteadyVelocities:
 
     def __init__(self) -> None:
         self._ids = np.zeros(0, np.int64)
-        self._moved = np.zeros(0, np.bool_)
+        self._moving_s = np.zeros(0)
         self._velocity: FloatArray = np.zeros((0, 2))
         self._variance: FloatArray = np.zeros((0, 2))
         self._captured_ns = 0
@@ -48,32 +56,54 @@ class SteadyVelocities:
         if not np.count_nonzero(moving):
             self._ids = self._ids[:0]
             return seen
-        velocity, variance, innovation = _averaged(
+        moving_s, velocity, variance, innovation = _averaged(
             seen.ids,
             moving,
+            seen.tracked_s,
             seen.velocity_mps,
             seen.covariance,
             self._ids,
-            self._moved,
+            self._moving_s,
             self._velocity,
             self._variance,
             dt_s,
         )
-        self._ids, self._moved, self._velocity, self._variance = seen.ids, moving, velocity, variance
+        self._ids, self._moving_s, self._velocity, self._variance = (
+            seen.ids,
+            moving_s[:, 0],
+            velocity,
+            variance,
+        )
         return replace(seen, velocity_mps=velocity, innovation_mps=innovation)
 
 
+def missing_to_walking(velocity_mps: FloatArray) -> FloatArray:
+    """(N, 2) how much faster bodies that set off with velocity_mps (N, 2) may become, straight on."""
+    return _missing_to_walking(velocity_mps)
+
+
+@inlined
+def _missing_to_walking(velocity_mps: FloatArray) -> FloatArray:
+    missing = np.zeros_like(velocity_mps)
+    for k in range(len(velocity_mps)):
+        speed_mps = max(math.hypot(velocity_mps[k, 0], velocity_mps[k, 1]), _LEAST_MPS)
+        for axis in range(2):
+            missing[k, axis] = velocity_mps[k, axis] * max(_WALKING_MPS / speed_mps - 1.0, 0.0)
+    return missing
+
+
 @compiled(
-    "int64[:], boolean[:], float64[:, :], float64[:, :, :],"
-    "int64[:], boolean[:], float64[:, :], float64[:, :], float64"
+    "int64[:], boolean[:], float64[:], float64[:, :], float64[:, :, :],"
+    "int64[:], float64[:], float64[:, :], float64[:, :], float64"
 )
 def _averaged(
     ids: NDArray[np.int64],
     moving: NDArray[np.bool_],
+    tracked_s: FloatArray,
     measured_mps: FloatArray,
     covariance: FloatArray,
     before_ids: NDArray[np.int64],
-    moved: NDArray[np.bool_],
+    before_moving_s: FloatArray,
     before_mps: FloatArray,
     before_variance: FloatArray,
     dt_s: float,
@@ -83,14 +113,16 @@ def _averaged(
     before_ids, moved (M,), before_mps and before_variance (M, 2): the bodies of the last scene. A body that
     did not move then starts with its measurement.
     """
-    result = np.zeros((3, *measured_mps.shape))
-    velocity, variance, innovation = result
+    result = np.zeros((4, *measured_mps.shape))
+    moving_s, velocity, variance, innovation = result
     correlated = max(_CORRELATED_S / dt_s, 1.0)
     for k in range(len(ids)):
         before = -1
         for m in range(len(before_ids)):
-            if moving[k] and moved[m] and ids[k] == before_ids[m]:
+            if moving[k] and before_moving_s[m] > 0.0 and ids[k] == before_ids[m]:
                 before = m
+        if moving[k]:
+            moving_s[k] = dt_s if before < 0 else before_moving_s[before] + dt_s
         for axis in range(2):
             measured, spread = measured_mps[k, axis], covariance[k, axis, axis]
             velocity[k, axis], variance[k, axis] = measured, spread
@@ -103,4 +135,9 @@ def _averaged(
             differs = measured - average
             beyond_noise = max(abs(differs) - _NOISE_SIGMAS * math.sqrt(spread), 0.0)
             innovation[k, axis] = _SURPRISE_GAIN * math.copysign(beyond_noise, differs)
+        if 0.0 < moving_s[k, 0] < min(_SETTING_OFF_S, tracked_s[k] - _STOOD_S):
+            missing_mps = _missing_to_walking(velocity[k : k + 1])[0]
+            for axis in range(2):
+                if abs(missing_mps[axis]) > abs(innovation[k, axis]):
+                    innovation[k, axis] = missing_mps[axis]
     return result

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +13,7 @@ from config.decision import DecisionConfig
 from controller.decision.decide import Action
 from tests.support.decision_bench import Bench, obstacle
 from tests.support.scenes import free_space
+from vision.scene import FreeSpace
 
 
 def test_a_free_way_is_driven_at_full_speed() -> None:
@@ -38,6 +40,24 @@ def test_a_crate_on_the_path_with_all_its_numbers() -> None:
     assert nearer.action is Action.DECREASE
     # v with v^2 / 0.6 + 0.25 v + 0.22 v + 0.45 = 4.39
     assert nearer.target_speed_mps == pytest.approx(1.402, abs=0.001)
+
+
+def test_a_crate_in_the_margin_tells_how_much_room_it_leaves() -> None:
+    """Its side 0.64 - 0.25 - 0.27 = 0.12 m beside the robot of 0.78 m."""
+    sentence = Bench().settle(obstacle(2.0, -0.76), v_mps=1.0).reason.sentence
+    assert sentence.startswith(
+        "obstacle 5 leaves 0.12 m beside the swept width, which needs 0.20 m, 1.4 m ahead:"
+    )
+
+
+def test_a_surface_in_the_margin_does_too() -> None:
+    bearing = np.linspace(-0.52, 0.52, 60)
+    walls = FreeSpace(bearing, 0.52 / 60, np.where(np.abs(bearing) > 0.2, 2.4, np.inf), np.full(60, 10.0))
+    reason = Bench().settle(v_mps=1.0, free=walls).reason
+    assert reason.rule == "depth"
+    assert re.match(
+        r"a surface leaves 0\.\d\d m beside the swept width, which needs 0.15 m, ", reason.sentence
+    )
 
 
 def test_a_crate_beside_the_path_changes_nothing() -> None:

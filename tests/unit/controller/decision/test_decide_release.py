@@ -61,6 +61,18 @@ def test_it_does_not_creep_on_whenever_what_stands_there_is_missed_for_a_moment(
             assert "stands on the path" in decision.reason.sentence
 
 
+def test_what_comes_and_goes_does_not_stop_a_robot_that_still_rolls_but_lets_it_get_no_faster() -> None:
+    """Half a second there, half a second gone, there again, gone: meanwhile the robot has come to roll."""
+    bench = Bench()
+    there = obstacle(1.2, 0.0)
+    for frame in range(75):
+        bench.step(bench.scene() if 25 <= frame < 50 else bench.scene(there), 0.0)
+    targets = [bench.step(bench.scene(), 0.4).target_speed_mps for _ in range(120)]
+    # The release gate comes first; slower than creep_mps it does not roll on.
+    assert set(targets[25:45]) == {0.4}
+    assert targets[-1] > 0.4
+
+
 def test_once_it_has_been_gone_for_a_second_the_way_is_free() -> None:
     bench = Bench()
     there = obstacle(1.2, 0.0)

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from controller.braking import BrakeLimits
-from controller.decision.limits import Gap, Motion, speed_to_decide_by, stop_before
+from controller.decision.limits import Gap, Motion, speed_to_decide_by, standing_text, stop_before
 
 COMFORT = BrakeLimits(0.3, 0.6)
 
@@ -40,6 +40,11 @@ def test_standing_is_never_urgent() -> None:
     assert limit.speed_mps == 0.0
     assert not limit.urgent
     assert limit.reason.sentence == "a surface stands 0.0 m ahead: stop"
+
+
+def test_what_stands_beside_the_way_tells_how_much_room_it_leaves_and_how_much_is_needed() -> None:
+    assert standing_text(-0.1, 0.2) == standing_text(math.inf, 0.2) == "stands on the path"
+    assert standing_text(0.12, 0.2) == "leaves 0.12 m beside the swept width, which needs 0.20 m,"
 
 
 def test_an_oncoming_obstacle_needs_more() -> None:

@@ -20,9 +20,9 @@ PREDICTION = Prediction(sigmas=2.0)
 UNSEEN_S, SINCE_S = 0.5, 0.1
 
 
-def found(body: Bodies) -> Manoeuvres:
-    """For a body that was last seen 0.5 s before its scene, which was 0.1 s ago."""
-    body = replace(body, unseen_s=np.array([UNSEEN_S]))
+def found(body: Bodies, unseen_s: float = UNSEEN_S) -> Manoeuvres:
+    """For a body that was last seen unseen_s before its scene, which was 0.1 s ago."""
+    body = replace(body, unseen_s=np.array([unseen_s]))
     placed = place(body, CORRIDOR, np.zeros(1), 0.0, 12.0)
     velocities = path_velocities(body, placed.heading_rad[:, 0])
     none = np.array([False])
@@ -68,3 +68,13 @@ def test_who_comes_or_leaves_has_not_turned_while_out_of_view() -> None:
     assert comes.since_s[0] == leaves.since_s[0] == pytest.approx(SINCE_S)
     assert crosses.uncertain_left_m[0] == comes.uncertain_along_m[0] == pytest.approx(2.0 * UNSEEN_S * 0.1)
     assert leaves.uncertain_left_m[0] == leaves.uncertain_along_m[0] == 0.0
+
+
+def test_out_of_view_only_who_comes_nearly_straight_keeps_its_lane() -> None:
+    """At 34 degrees to the path it may well cross it; in view, it would be seen to."""
+    straight, aslant = found(box(5.0, 2.0, -1.0, -0.4)), found(box(5.0, 2.0, -1.0, -0.67))
+    assert straight.since_s[0] == pytest.approx(SINCE_S)
+    assert straight.change_left_mps2[0] == PREDICTION.oncoming_mps2
+    assert aslant.since_s[0] == pytest.approx(SINCE_S + UNSEEN_S)
+    assert aslant.change_left_mps2[0] == PREDICTION.manoeuvre_mps2
+    assert found(box(5.0, 2.0, -1.0, -0.67), unseen_s=0.0).change_left_mps2[0] == PREDICTION.oncoming_mps2

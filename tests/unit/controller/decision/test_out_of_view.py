@@ -29,9 +29,11 @@ class Recall:
         self.before = no_bodies(0)
         self.now_ns = 0
 
-    def see(self, bodies: Bodies | None, x_m: float, standing: bool = False) -> list[int]:
+    def see(
+        self, bodies: Bodies | None, x_m: float, standing: bool = False, free: FreeSpace = NOTHING_SEEN
+    ) -> list[int]:
         """One scene from a robot at x_m; returns the ids of what is remembered besides it."""
-        return [int(one) for one in self.recall(bodies, x_m, NOTHING_SEEN, standing).ids]
+        return [int(one) for one in self.recall(bodies, x_m, free, standing).ids]
 
     def recall(self, bodies: Bodies | None, x_m: float, free: FreeSpace, standing: bool = False) -> Bodies:
         """The same; returns what is remembered."""
@@ -55,12 +57,51 @@ def test_a_low_pallet_sinks_below_the_view() -> None:
 def test_what_is_tall_does_not_sink() -> None:
     recall = Recall()
     recall.see(box(5.0, 0.0, top_m=1.7), 3.2)
-    assert recall.see(None, 3.6) == []
+    assert recall.see(None, 3.6, free=ALL_SEEN) == []
 
 
 def test_what_vanishes_far_away_has_gone() -> None:
     recall = Recall()
     recall.see(PALLET, 1.0)
+    assert recall.see(None, 1.1, free=ALL_SEEN) == []
+
+
+def seen_to(nearest_m: float, known_m: float) -> FreeSpace:
+    return FreeSpace(BANDS, 0.025, np.full(20, nearest_m), np.full(20, known_m))
+
+
+@pytest.mark.parametrize(
+    ("free", "kept"),
+    [
+        (NOTHING_SEEN, [1]),
+        (seen_to(1.0, 1.0), [1]),
+        (seen_to(np.inf, 3.5), [1]),
+        (seen_to(3.5, 3.4), []),
+        (seen_to(7.0, 6.9), []),
+        (ALL_SEEN, []),
+    ],
+    ids=[
+        "no depth",
+        "something nearer",
+        "floor in part",
+        "a surface there",
+        "a surface behind",
+        "free floor",
+    ],
+)
+def test_what_is_missed_in_the_middle_of_the_view_stays_until_its_place_is_seen(
+    free: FreeSpace, kept: list[int]
+) -> None:
+    """3.6 m ahead of the camera, as thin as a fork of a pallet jack."""
+    recall = Recall()
+    recall.see(box(5.0, 0.0, top_m=0.08, half_across_m=0.04), 1.0)
+    for _ in range(30):
+        assert recall.see(None, 1.0 + 1e-3, free=free) == kept
+
+
+def test_far_away_it_does_not() -> None:
+    recall = Recall()
+    recall.see(box(8.0, 0.0), 1.0)
     assert recall.see(None, 1.1) == []
 
 
@@ -89,7 +130,7 @@ def test_it_is_forgotten_when_its_place_is_seen_again() -> None:
     recall.see(PALLET, 3.2)
     for _ in range(100):  # for ten seconds
         assert recall.see(None, 3.6) == [1]
-    assert recall.see(None, 2.0) == []
+    assert recall.see(None, 2.0, free=ALL_SEEN) == []
 
 
 def test_it_is_not_counted_twice_when_it_is_seen_again() -> None:
@@ -153,7 +194,7 @@ def test_who_walks_away_is_not() -> None:
     assert kept == []
 
 
-@pytest.mark.parametrize(("aside_mps", "kept"), [(0.1, [1]), (0.35, [])])
+@pytest.mark.parametrize(("aside_mps", "kept"), [(0.1, [1]), (0.2, []), (0.35, [])])
 def test_who_goes_along_but_leaves_aslant_is_not_either(aside_mps: float, kept: list[int]) -> None:
     """After 4 s: who goes almost along the path could still cut in."""
     recall = Recall()

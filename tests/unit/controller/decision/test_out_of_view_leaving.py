@@ -54,6 +54,8 @@ def test_who_is_clearly_coming_when_it_leaves_the_view_moves() -> None:
     found = after(measured(AT_EDGE, -0.4), expected(AT_EDGE), expected(AT_EDGE))
     assert found.moving.tolist() == [True]
     assert found.velocity_mps[0].tolist() == [0.05, -0.4]
+    # It has just set off, and may reach a walking speed.
+    assert np.hypot(*(found.velocity_mps + found.innovation_mps)[0]) == pytest.approx(1.2)
 
 
 def test_on_the_right_as_on_the_left() -> None:

@@ -72,7 +72,10 @@ def test_a_surface_beside_the_corridor_does_not_count() -> None:
     beside = np.where(np.abs(BEARING) > 0.21, 3.0, math.inf)
     assert Watch().look(free(beside), times=5).surface_s_m == math.inf
     inside = np.where(np.abs(BEARING) > 0.17, 3.0, math.inf)
-    assert Watch().look(free(inside), times=5).surface_s_m == pytest.approx(3.4)
+    sight = Watch().look(free(inside), times=5)
+    assert sight.surface_s_m == pytest.approx(3.4)
+    assert sight.surface_clearance_m == pytest.approx(0.1, abs=0.04)
+    assert Watch().look(free(nearest_m=3.0), times=5).surface_clearance_m < 0.0
 
 
 def test_a_surface_beside_or_behind_the_robot_does_not_count() -> None:

@@ -14,8 +14,12 @@ from tests.support.floor_bodies import box
 FRAME_NS = 33_333_333
 
 
-def seen(frame: int, vx_mps: float, vy_mps: float, sigma_mps: float, number: int = 1) -> Bodies:
-    body = box(5.0, 0.0, vx_mps, vy_mps, number=number, sigma_mps=sigma_mps)
+def seen(
+    frame: int, vx_mps: float, vy_mps: float, sigma_mps: float, number: int = 1, stood_s: float = 0.0
+) -> Bodies:
+    """Tracked since frame 0, and for stood_s before."""
+    age_s = stood_s + frame * FRAME_NS / 1e9
+    body = box(5.0, 0.0, vx_mps, vy_mps, number=number, sigma_mps=sigma_mps, age_s=age_s)
     return replace(body, captured_ns=frame * FRAME_NS)
 
 
@@ -72,6 +76,28 @@ def test_who_stood_begins_anew() -> None:
     steady.update(seen(1, -1.0, 0.0, 0.3))
     steady.update(seen(2, 0.0, 0.0, 0.3))
     assert steady.update(seen(3, 0.8, 0.0, 0.3)).velocity_mps[0, 0] == pytest.approx(0.8)
+
+
+def test_who_stood_and_sets_off_may_reach_a_walking_speed() -> None:
+    """1.2 m/s, along the way on which it sets off, for a second."""
+    steady = SteadyVelocities()
+    for frame in range(1, 31):
+        found = steady.update(seen(frame, -0.3, 0.4, 0.05, stood_s=1.0))
+        assert (found.velocity_mps + found.innovation_mps)[0] == pytest.approx([-0.72, 0.96])
+    assert steady.update(seen(31, -0.3, 0.4, 0.05, stood_s=1.0)).innovation_mps[0] == pytest.approx(
+        [0.0, 0.0]
+    )
+
+
+def test_who_is_as_fast_as_that_already_gets_no_faster() -> None:
+    assert not SteadyVelocities().update(seen(1, -1.0, 0.8, 0.05, stood_s=1.0)).innovation_mps.any()
+
+
+def test_who_was_never_seen_to_stand_does_not_set_off() -> None:
+    assert not SteadyVelocities().update(seen(9, -0.3, 0.4, 0.05)).innovation_mps.any()
+    steady = SteadyVelocities()
+    for frame in range(1, 20):
+        assert not steady.update(seen(frame, -0.3, 0.4, 0.05)).innovation_mps.any()
 
 
 def test_others_are_not_mixed_up() -> None:
