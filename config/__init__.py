@@ -11,5 +11,6 @@ decision.py - margins, prediction, sight and release of the decision
 path.py - the planned path: start pose, lines and arcs
 governor.py - commands of another planner in place of a path
 scenario.py - a simulated world
+faults.py - what goes wrong in it
 recording.py - camera.yaml of a recording
 """
