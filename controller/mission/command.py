@@ -21,8 +21,10 @@ from controller.ending import Outcome
 from controller.errors import UserError
 from controller.lockstep import run_lockstep
 from controller.mission.blind_bends import blind_bend_warning
+from controller.mission.close_by import close_by_warning
 from controller.mission.possible_world import require_possible_world
 from controller.mission.result import MissionOptions, MissionResult
+from controller.mission.short_arcs import short_arc_warning
 from controller.realtime.mission import drive_realtime
 from controller.realtime.service import StopRequest
 from controller.record.observations import STANDARD_OUTPUT
@@ -47,7 +49,7 @@ def run_mission(options: MissionOptions) -> int:
         )
     console = Console(options.quiet, aside=options.observations == STANDARD_OUTPUT)
     require_possible_world(config, options.config_path)
-    for told in (blind_bend_warning, unused_faults_warning):
+    for told in (short_arc_warning, close_by_warning, blind_bend_warning, unused_faults_warning):
         warning = told(config, options.config_path)
         if warning is not None:
             console.warning(warning)
