@@ -6,6 +6,7 @@ from collections import Counter
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
+import yaml
 from pydantic import Field, model_validator
 
 from config.faults import NO_FAULTS, Faults
@@ -239,6 +240,11 @@ class Scenario(Section):
 def scenario_names() -> tuple[str, ...]:
     """The scenarios that ship with the program."""
     return tuple(sorted(path.stem for path in SCENARIO_DIR.glob("*.yaml")))
+
+
+def as_yaml(scenario: Scenario) -> str:
+    """A scenario as the text of a file that load_scenario reads."""
+    return yaml.safe_dump(scenario.model_dump(mode="json", exclude_none=True), sort_keys=False)
 
 
 def load_scenario(name_or_path: str | Path) -> Scenario:

@@ -12,9 +12,8 @@ from contextlib import ExitStack
 from pathlib import Path as FilePath
 from tempfile import TemporaryDirectory
 
-import yaml
-
 from config.app import AppConfig, LockstepRunner, SimulationConfig
+from config.scenario import as_yaml
 from controller.answer import BaseAnswer
 from controller.build import (
     build_path,
@@ -53,14 +52,8 @@ def drive_camera(stage: Stage, config: AppConfig, policy: str, keep: FilePath | 
     """Drive once. keep: folder for the recording, the observations and the video; None: none are written."""
     with TemporaryDirectory(prefix="treadwatch-") as folder:
         scenario = FilePath(folder) / "scenario.yaml"
-        scenario.write_text(scenario_yaml(stage), encoding="utf-8")
+        scenario.write_text(as_yaml(stage.case.scenario), encoding="utf-8")
         return _drive(stage, _mission_config(config, stage, scenario), scenario, policy, keep)
-
-
-def scenario_yaml(stage: Stage) -> str:
-    """The mission's world as YAML, as `treadwatch run --scenario` reads it."""
-    content = stage.case.scenario.model_dump(mode="json", exclude_none=True)
-    return yaml.safe_dump(content, sort_keys=False)
 
 
 def _mission_config(config: AppConfig, stage: Stage, scenario: FilePath) -> AppConfig:
@@ -138,7 +131,7 @@ def prepare_recording(folder: FilePath, stage: Stage) -> RecordingOptions:
     UserError."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        (folder / "scenario.yaml").write_text(scenario_yaml(stage), encoding="utf-8")
+        (folder / "scenario.yaml").write_text(as_yaml(stage.case.scenario), encoding="utf-8")
     except OSError as error:
         raise UserError(f"{folder}: cannot be written ({error.strerror}); choose another --report") from error
     return RecordingOptions(
