@@ -5,7 +5,8 @@ known_keys.py - names the place of a mistake and suggests the key that was meant
 app.py - the whole configuration of `treadwatch run`, `govern` and `replay`, and what must fit together
 robot.py - body, limits and camera mount of the robot
 camera.py - which camera, with its settings
-chassis.py - which chassis, the link to it, and the simulated base behind an emulator
+chassis.py, agilex.py - which chassis, and the link to it
+plant.py - the simulated base behind an emulator
 perception.py - detection, ego-motion and tracking
 decision.py - margins, prediction, sight and release of the decision
 path.py - the planned path: start pose, lines and arcs

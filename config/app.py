@@ -13,7 +13,6 @@ from config.chassis import (
     COMMAND_EARLY,
     AnyChassisConfig,
     ChassisConfig,
-    PlantConfig,
     RoboclawChassisConfig,
     RoboteqChassisConfig,
 )
@@ -22,6 +21,7 @@ from config.governor import GovernorConfig
 from config.loader import Section, load, read_yaml
 from config.path import PathSpec
 from config.perception import PerceptionConfig
+from config.plant import PlantConfig
 from config.robot import Robot
 
 # What a robot with a real camera has to be told; each has a default for simulations.

@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from config.chassis import PlantConfig
+from config.plant import PlantConfig
 from hal.chassis.tracks import TrackGeometry
 from hal.clocks import NS_PER_S
 from hal.types import PlanarPose
