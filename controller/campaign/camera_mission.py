@@ -50,7 +50,13 @@ _NO_RECORDING = RecordingOptions(timed=False)
 
 def drive_camera(stage: Stage, config: AppConfig, policy: str, keep: FilePath | None = None) -> DriveLog:
     """Drive once. keep: folder for the recording, the observations and the video; None: none are written."""
-    with TemporaryDirectory(prefix="treadwatch-") as folder:
+    try:
+        temporary = TemporaryDirectory(prefix="treadwatch-")
+    except OSError as error:
+        raise UserError(
+            f"no temporary folder can be made ({error.strerror}); set TMPDIR to one that can be written"
+        ) from error
+    with temporary as folder:
         scenario = FilePath(folder) / "scenario.yaml"
         scenario.write_text(as_yaml(stage.case.scenario), encoding="utf-8")
         return _drive(stage, _mission_config(config, stage, scenario), scenario, policy, keep)

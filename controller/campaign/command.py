@@ -72,7 +72,7 @@ def run_campaign(options: CampaignOptions) -> int:
     store = MissionStore(options.report, config.model_dump_json(indent=1))
     store.begin(options.resume)
     _check_modes(options, store)
-    keep_own(options.report, own)
+    keep_own(options.report, own, {row.family for row in store.rows.values()})
     keep = options.report / FAILING if options.video else None
     tasks = []
     for mission in missions(options.missions, families, options.seed):

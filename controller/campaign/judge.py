@@ -32,6 +32,7 @@ class Row:
     expected: whether the target should be reached at all.
     touched: names of the bodies of contacts at fault.
     time_s: until rest on the target; None if it was not reached.
+    min_clearance_m: inf if there is nothing to come near to.
     oracle_time_s: None if not even the oracle reaches the target.
     """
 
@@ -55,8 +56,9 @@ class Row:
     flaps: int
 
     def as_dict(self) -> dict[str, object]:
-        """The row as a dictionary for JSON."""
-        return asdict(self)
+        """The row as a dictionary for JSON, which has no infinity: null."""
+        clearance_m = self.min_clearance_m if math.isfinite(self.min_clearance_m) else None
+        return {**asdict(self), "min_clearance_m": clearance_m}
 
 
 @dataclass(frozen=True, slots=True)

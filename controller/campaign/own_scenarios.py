@@ -62,18 +62,19 @@ def _in_this_world(config: AppConfig, given: str) -> AppConfig:
     return config.model_copy(update={"simulation": changed})
 
 
-def keep_own(folder: Path, own: Mapping[str, OwnScenario]) -> None:
+def keep_own(folder: Path, own: Mapping[str, OwnScenario], driven: set[str]) -> None:
     """Copy the scenarios into a report's folder.
 
-    Raises UserError, also where an earlier campaign of this report drove other content of the same name.
+    driven: labels of which the report has rows already. Raises UserError, also where those were driven with
+    other content.
     """
     kept = folder / KEPT
     for label, one in own.items():
         file = kept / label
         try:
-            if file.exists() and load_scenario(file) == one.scenario:
-                continue
-            if file.exists():
+            if label in driven and file.exists():
+                if load_scenario(file) == one.scenario:
+                    continue
                 raise UserError(
                     f"{one.given}: {folder} was driven with another content of it, which is in {file}; "
                     "go on with that one, or give another --report folder"

@@ -59,7 +59,7 @@ def driven_rows(rows: Iterable[Row], own: Mapping[str, Scenario]) -> list[list[s
     for row in rows:
         seeds.setdefault(row.family, set()).add(row.seed)
     return [
-        [family, _what_it_is(family, own), f"{min(found)} to {max(found)}", str(len(found))]
+        [family, _what_it_is(family, own), _seeds_in_words(found), str(len(found))]
         for family, found in seeds.items()
     ]
 
@@ -73,7 +73,11 @@ def _what_it_is(family: str, own: Mapping[str, Scenario]) -> str:
     parts = [f"{KEPT}/{family}", " ".join(scenario.description.split())]
     parts += [f"faults: {', '.join(faults)}"] if faults else []
     parts += [f"glass: {', '.join(glass)}"] if glass else []
-    return "; ".join(part for part in parts if part).replace("|", "/")
+    return "; ".join(part for part in parts if part)
+
+
+def _seeds_in_words(seeds: set[int]) -> str:
+    return str(min(seeds)) if len(seeds) == 1 else f"{min(seeds)} to {max(seeds)}"
 
 
 def report_lines(summary: Summary, command: str, driven: list[list[str]]) -> list[str]:
@@ -85,7 +89,8 @@ def report_lines(summary: Summary, command: str, driven: list[list[str]]) -> lis
         the sensors, textures, and the starts of movers with start_jitter_s. Yaw slip and vibration occur with
         `--mode camera` only.""",
     )
-    lines += markdown.table(_DRIVEN_HEADER, driven)
+    # A file name or a description may hold what ends a cell.
+    lines += markdown.table(_DRIVEN_HEADER, [[cell.replace("|", "\\|") for cell in row] for row in driven])
     lines += markdown.section(
         "Policies",
         """Time is that of the drive over that of the oracle, which knows all motions in advance; a drive that

@@ -101,7 +101,7 @@ def evaluate(
 @click.command()
 @config_option("of robot, camera, chassis, perception and decision")
 @click.option(
-    "--missions", type=WholeNumber(min=1), default=260, show_default=True,
+    "--missions", type=WholeNumber(1, 1_000_000), default=260, show_default=True,
     help="How many, spread evenly over the families or scenarios, each with seeds of its own.",
 )  # fmt: skip
 @click.option(

@@ -109,6 +109,27 @@ def test_one_mission_of_a_scenario_alone(world: Path) -> None:
     assert "reached in" in campaign("--only", "hall.yaml:3", "--scenario", world, "--policies", "field")
 
 
+def test_what_was_not_driven_yet_may_change(world: Path, tmp_path: Path) -> None:
+    kept = tmp_path / "report" / "scenarios" / "hall.yaml"
+    kept.parent.mkdir(parents=True)
+    kept.write_text(WORLD.replace("y_m: 1.5", "y_m: 1.4"))
+    campaign("--scenario", world, "--policies", "field", "--report", tmp_path / "report", "--missions", "1")
+    assert load_scenario(kept) == load_scenario(world)
+
+
+def test_a_world_without_bodies_has_no_clearance_to_tell(world: Path, tmp_path: Path) -> None:
+    world.write_text(
+        "".join(line for line in WORLD.splitlines(True) if "crate" not in line or "desc" in line)
+    )
+    world.write_text(world.read_text().replace("bodies:", "bodies: []").replace("a crate beside", "a | b"))
+    report = tmp_path / "report"
+    given = ("--scenario", world, "--policies", "field", "--report", report, "--missions", "1")
+    campaign(*given)
+    campaign(*given, "--resume")
+    assert rows(report)[0]["min_clearance_m"] is None
+    assert "; a \\| b the way; " in (report / "report.md").read_text()
+
+
 def test_what_is_doubtful_is_told(world: Path) -> None:
     world.write_text(WORLD.replace("y_m: 1.5", "y_m: 0.89"))
     assert "from 'crate'" in campaign("--only", f"{world}:3", "--policies", "field")
