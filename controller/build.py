@@ -216,6 +216,14 @@ def build_world(config: AppConfig, config_path: FilePath) -> World:
     return World(scenario_of(config.simulation, config_path), config.simulation.seed)
 
 
+def build_still_world(config: AppConfig, config_path: FilePath) -> World:
+    """The scenario that is simulated without its movers. Raises ConfigError."""
+    assert config.simulation is not None, "AppConfig asks for a simulation"
+    scenario = scenario_of(config.simulation, config_path)
+    still = tuple(body for body in scenario.bodies if body.motion is None)
+    return World(scenario.model_copy(update={"bodies": still}))
+
+
 def surroundings(config: AppConfig) -> Surroundings:
     """What a video shows around the observations."""
     return Surroundings(

@@ -7,8 +7,7 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from config.app import AppConfig
-from config.scenario import Scenario
-from controller.build import build_path, path_spec, scenario_of
+from controller.build import build_path, build_still_world, path_spec, scenario_of
 from controller.path.path import Path
 from hal.types import PlanarPose
 from sim.contact import BUILDING, nearest_body
@@ -34,18 +33,13 @@ def close_by_warning(config: AppConfig, config_path: FilePath) -> str | None:
         return None
     where, _ = path_spec(config, config_path)
     path = build_path(config, config_path)
-    world = _still_world(scenario)
+    world = build_still_world(config, config_path)
     told = _beside(config, path, world) | _behind_target(config, path, world)
     if not told:
         return None
     words = list(told.values())
     more = f"; and {len(words) - _MOST_TOLD} more" if len(words) > _MOST_TOLD else ""
     return f"{where}: path: {'; '.join(words[:_MOST_TOLD])}{more}"
-
-
-def _still_world(scenario: Scenario) -> World:
-    still = tuple(body for body in scenario.bodies if body.motion is None)
-    return World(scenario.model_copy(update={"bodies": still}))
 
 
 def _beside(config: AppConfig, path: Path, world: World) -> dict[str, str]:

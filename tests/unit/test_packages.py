@@ -30,6 +30,7 @@ NO_DEVICES = {
     "sim.contact",
     "sim.plant",
     "sim.simulation",
+    "sim.world",
 }
 
 
