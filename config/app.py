@@ -8,13 +8,14 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from config.camera import AnyCameraConfig, CameraConfig, ReplayCameraConfig, SimulatedCameraConfig
-from config.chassis import ChassisConfig, PlantConfig
+from config.chassis import ChassisConfig
 from config.chassis_checks import check_protocol, check_top_speed, check_turns
 from config.decision import DecisionConfig
 from config.governor import GovernorConfig
 from config.loader import Section, load, read_yaml
 from config.path import PathSpec
 from config.perception import PerceptionConfig
+from config.plant import PlantConfig
 from config.robot import Robot
 
 # Keys that a robot with a real camera must give; in a simulation each has a default.

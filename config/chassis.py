@@ -109,7 +109,15 @@ AgilexLinkConfig = Annotated[
 ]
 
 
-class AgilexChassisConfig(Section):
+class _Battery(Section):
+    """What all bases have in common."""
+
+    battery_low_v: float | None = Field(
+        default=None, gt=0, le=200, description="told where the battery stays below it for 3 s; null: never"
+    )
+
+
+class AgilexChassisConfig(_Battery):
     """An AgileX base that speaks protocol V2, over CAN or, where it has that, over RS-232.
 
     link: ``{interface: socketcan, channel: can0}``, or ``{url: /dev/ttyUSB0}`` for RS-232.
@@ -118,7 +126,7 @@ class AgilexChassisConfig(Section):
     geometry; without the key it is the model's, where a manual says it. slip_factor: effective over real
     track width, >= 1 because tracks scrub sideways in a turn: the base turns 1 / slip_factor of what its
     tracks say. Measure it by turning on the spot. actuators: how many motors report, where your base
-    differs from its model.
+    differs from its model. battery_low_v: without the key it is the model's, where a manual says it.
     """
 
     kind: Literal["agilex"]
@@ -156,7 +164,7 @@ class AgilexChassisConfig(Section):
         return self
 
 
-class _TwoChannelConfig(Section):
+class _TwoChannelConfig(_Battery):
     """What bases with one two-channel motor controller have in common: channel 1 left, channel 2 right.
 
     counts_per_m: encoder counts for one metre of track. slip_factor: as for AgileX.
@@ -244,7 +252,7 @@ KOBUKI_TOP_SPEED_MPS = 0.7
 KOBUKI_WHEEL_BASE_M = 0.23
 
 
-class KobukiChassisConfig(Section):
+class KobukiChassisConfig(_Battery):
     """A Kobuki, the base of Turtlebot 2. Its geometry is fixed: the base itself turns a twist into speeds.
 
     max_speed_mps, max_yaw_rate_radps: of the base; a bend in which a wheel would be faster than it makes,
@@ -263,6 +271,7 @@ class KobukiChassisConfig(Section):
     command_timeout_ms: int = Field(default=200, ge=40, le=1000)
     feedback_timeout_ms: int = Field(default=200, ge=60, le=2000, description="of its stream, 50 a second")
     arming_timeout_ms: int = Field(default=3000, ge=200, le=60_000)
+    battery_low_v: float | None = Field(default=14.0, gt=0, le=200, description="as the vendor's driver")
 
     @property
     def top_speed_mps(self) -> float:
@@ -285,16 +294,3 @@ CHASSIS_KINDS: tuple[str, ...] = tuple(
     get_args(config.model_fields["kind"].annotation)[0] for config in get_args(AnyChassisConfig)
 )
 ChassisConfig = Annotated[AnyChassisConfig, Field(discriminator="kind")]
-
-
-class PlantConfig(Section):
-    """The simulated tracked base behind a chassis emulator.
-
-    lag_s: time constant of each track's speed loop. slip_factor: see AgilexChassisConfig; 1.1 turns
-    about 10 % less than the tracks say.
-    """
-
-    track_width_m: float = Field(default=0.555, gt=0.05, le=5)
-    lag_s: float = Field(default=0.08, gt=0, le=2)
-    max_accel_mps2: float = Field(default=2.0, gt=0, le=50)
-    slip_factor: float = Field(default=1.1, ge=1.0, le=3.0)

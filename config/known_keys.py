@@ -9,6 +9,8 @@ from typing import get_args
 
 from pydantic import BaseModel
 
+_LONGEST_NAME = 40
+
 
 def advice(model: type[BaseModel], place: Sequence[int | str]) -> str:
     """What to write in place of the unknown key at place, pydantic's path to it within model."""
@@ -30,6 +32,29 @@ def written(model: type[BaseModel], place: Sequence[int | str], *, last_is_key: 
             keys.append(str(step))
         sections = _within(sections, step)
     return ".".join(keys)
+
+
+def whose(content: object, place: Sequence[int | str]) -> str:
+    """The item of a list that place lies in, by its kind and name in the file; "" if it needs no name.
+
+    content: of the whole file. Steps that are not in it are tags of unions, which pydantic inserts.
+    """
+    for step in place:
+        if isinstance(content, list) and isinstance(step, int) and step < len(content):
+            return _item_in_words(content[step], nameless=place[-1] == "name")
+        if isinstance(content, dict) and step in content:
+            content = content[step]
+    return ""
+
+
+def _item_in_words(item: object, nameless: bool) -> str:
+    if not isinstance(item, dict) or ("name" not in item and not nameless):
+        return ""
+    kind, name = item.get("kind"), item.get("name")
+    words = [kind[:_LONGEST_NAME]] if isinstance(kind, str) else []
+    if isinstance(name, str):
+        words.append(repr(name[:_LONGEST_NAME]))
+    return " ".join(words)
 
 
 def _known_at(model: type[BaseModel], steps: Sequence[int | str]) -> set[str]:

@@ -12,7 +12,7 @@ import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import ErrorDetails
 
-from config.known_keys import advice, written
+from config.known_keys import advice, whose, written
 
 CONFIG_DIR = Path(__file__).resolve().parent
 # How many mistakes are listed: a file with more is another kind of file, and the line must stay readable.
@@ -114,7 +114,7 @@ def load(path: Path, model: type[SectionT]) -> SectionT:
     try:
         return model.model_validate(content)
     except ValidationError as error:
-        raise ConfigError(f"{path}: {describe(error, model)}") from error
+        raise ConfigError(f"{path}: {describe(error, model, content)}") from error
 
 
 def _yaml_mistake(error: yaml.YAMLError) -> str:
@@ -127,8 +127,11 @@ def _yaml_mistake(error: yaml.YAMLError) -> str:
     return f"{where}{error.problem}" + (f" ({error.context})" if error.context else "") + advice
 
 
-def describe(error: ValidationError, model: type[BaseModel]) -> str:
-    """The mistakes of a validation in one line: ``key: reason; key: reason``."""
+def describe(error: ValidationError, model: type[BaseModel], content: object = None) -> str:
+    """The mistakes of a validation in one line: ``key: reason; key: reason``.
+
+    content: what was validated, to name items of lists: ``bodies.7.height_m (crate 'by the door'): reason``.
+    """
     parts = []
     told: set[str] = set()
     details = error.errors(include_url=False)
@@ -139,6 +142,9 @@ def describe(error: ValidationError, model: type[BaseModel]) -> str:
             continue  # wrong items are not counted, and have their own errors
         unknown = detail["type"] == "extra_forbidden"
         key = written(model, detail["loc"], last_is_key=unknown)
+        item = whose(content, detail["loc"])
+        if key and item:
+            key += f" ({item})"
         reason = detail["msg"].removeprefix("Value error, ")
         if detail["type"] in _IN_OTHER_WORDS:
             reason = _IN_OTHER_WORDS[detail["type"]].format(**detail.get("ctx", {}))

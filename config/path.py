@@ -9,6 +9,9 @@ from pydantic import Field, model_validator
 
 from config.loader import Section
 
+# A bend shorter than this turns the robot by less than it errs: nobody plans one.
+_SHORTEST_ARC_M = 0.5
+
 MaxSpeed = Annotated[float | None, Field(default=None, gt=0, le=5)]
 
 
@@ -46,6 +49,17 @@ class ArcSpec(Section):
         """Length along the arc, both blends included."""
         return self.radius_m * abs(math.radians(self.angle_deg)) + self.blend_m
 
+    @property
+    def may_be_in_radians(self) -> bool:
+        """Whether angle_deg was most likely given in radians: at most a turn of so many radians, and then the
+        robot would hardly go anywhere on this arc."""
+        return abs(self.angle_deg) <= math.tau and self.length_m - self.blend_m < _SHORTEST_ARC_M
+
+    @property
+    def in_degrees(self) -> str:
+        """What to write in place of an angle in radians."""
+        return f"angle_deg is in degrees: if radians were meant, write {math.degrees(self.angle_deg):.4g}"
+
     @model_validator(mode="after")
     def _has_an_angle_and_room_to_blend(self) -> Self:
         if self.angle_deg == 0:
@@ -54,6 +68,7 @@ class ArcSpec(Section):
         if self.blend_m > turn_m:
             raise ValueError(
                 f"blend_m must not exceed radius_m x angle = {turn_m:.3f} m; shorten it or widen the turn"
+                + (f"; {self.in_degrees}" if self.may_be_in_radians else "")
             )
         return self
 

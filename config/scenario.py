@@ -1,4 +1,4 @@
-"""A simulated world as written in YAML: the path, the building, the light, and the bodies in it."""
+"""A simulated world as written in YAML: path, building, light, bodies, and what goes wrong in it."""
 
 from __future__ import annotations
 
@@ -6,8 +6,10 @@ from collections import Counter
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
+import yaml
 from pydantic import Field, model_validator
 
+from config.faults import NO_FAULTS, Faults
 from config.loader import CONFIG_DIR, ConfigError, Section, load
 from config.path import PathSpec
 
@@ -63,6 +65,7 @@ class _Placed(Section):
     """name must be unique; x, y: the middle of the footprint on the floor; z_m: height of its underside.
 
     texture: fine (printed cardboard, labels, fabric), coarse (large patches), plain (nothing to track).
+    glass: colour shows the body, but depth has no valid pixel on it.
     """
 
     name: str = Field(min_length=1, max_length=40)
@@ -71,6 +74,7 @@ class _Placed(Section):
     z_m: float = Field(default=0.0, ge=0, le=50)
     heading_deg: float = Field(default=0.0, ge=-360, le=360)
     texture: Texture = "fine"
+    glass: bool = False
     motion: MotionPlan | None = None
 
 
@@ -223,6 +227,7 @@ class Scenario(Section):
     room: Room = Room()
     light: Light = Light()
     bodies: Annotated[tuple[BodySpec, ...], Field(strict=False)] = ()
+    faults: Faults = NO_FAULTS
 
     @model_validator(mode="after")
     def _names_are_unique(self) -> Self:
@@ -235,6 +240,11 @@ class Scenario(Section):
 def scenario_names() -> tuple[str, ...]:
     """The scenarios that ship with the program."""
     return tuple(sorted(path.stem for path in SCENARIO_DIR.glob("*.yaml")))
+
+
+def as_yaml(scenario: Scenario) -> str:
+    """A scenario as the text of a file that load_scenario reads."""
+    return yaml.safe_dump(scenario.model_dump(mode="json", exclude_none=True), sort_keys=False)
 
 
 def load_scenario(name_or_path: str | Path) -> Scenario:

@@ -13,13 +13,14 @@ from typing import assert_never
 
 import cv2
 
-from config.app import AppConfig, ReplayConfig, SimulationConfig
+from config.app import AppConfig, SimulationConfig
 from config.camera import (
     OdometryChoice,
     RealsenseCameraConfig,
     ReplayCameraConfig,
     SimulatedCameraConfig,
 )
+from config.faults import NO_FAULTS, Faults
 from config.governor import InputConfig, UdpInputConfig, UnixInputConfig
 from config.loader import resolve
 from config.path import LineSpec, PathSpec
@@ -44,10 +45,13 @@ from hal.cameras.pose_track import PoseTrack
 from hal.cameras.realsense import RealsenseCamera
 from hal.cameras.recording import Recording
 from hal.cameras.tum_replay import TumReplay
+from hal.clocks import NS_PER_S
 from hal.errors import BadRecording
 from hal.links.datagrams import UdpSocket, UnixSocket
 from hal.types import CameraMount, PlanarPose
 from sim.rendering.camera import SimulatedCamera
+from sim.rendering.faulty_camera import FaultyCamera
+from sim.rendering.late_camera import LateCamera
 from sim.simulation import Emulator, Referee, Simulation
 from sim.world import World
 from vision.perception import Perception
@@ -57,8 +61,6 @@ BodyPose = Callable[[int], PlanarPose | None]
 # Frame rate that is assumed for recordings: for the period of the decision, and for videos where the
 # recording's own rate is not known.
 REPLAY_FPS = 30.0
-_LEAST_FPS = 0.5
-_ORIGIN = PlanarPose(0.0, 0.0, 0.0)
 
 
 def limit_vision_threads() -> None:
@@ -138,7 +140,8 @@ def open_camera(
     """The camera that the YAML names, not yet entered. start_ns: time zero of a simulated world."""
     match config.camera:
         case SimulatedCameraConfig():
-            return open_simulated_camera(config, config_path, clock, body_pose, start_ns)
+            faulty = open_faulty_camera(config, config_path, clock, body_pose, start_ns)
+            return LateCamera(faulty, build_faults(config, config_path), clock, start_ns)
         case RealsenseCameraConfig() as camera:
             return RealsenseCamera(camera, clock)
         case ReplayCameraConfig() as camera:
@@ -181,17 +184,44 @@ def open_simulated_camera(
     )
 
 
+def open_faulty_camera(
+    config: AppConfig, config_path: FilePath, clock: Clock, body_pose: BodyPose, start_ns: int
+) -> FaultyCamera:
+    """The same camera with the faults of the scenario, except late frames, which the loop or LateCamera
+    delays."""
+    camera = open_simulated_camera(config, config_path, clock, body_pose, start_ns)
+    assert config.simulation is not None, "AppConfig asks for a simulation"
+    scenario = scenario_of(config.simulation, config_path)
+    glass = tuple(number for number, body in enumerate(scenario.bodies, start=1) if body.glass)
+    return FaultyCamera(camera, scenario.faults, glass)
+
+
+def build_faults(config: AppConfig, config_path: FilePath) -> Faults:
+    """What goes wrong in the scenario that is simulated. Raises ConfigError."""
+    return NO_FAULTS if config.simulation is None else scenario_of(config.simulation, config_path).faults
+
+
 def build_simulation(
     config: AppConfig, config_path: FilePath, emulator: Emulator, start_ns: int
 ) -> Simulation:
     """The emulated base in the scenario's world, with a referee. start_ns: the world's time zero."""
-    return Simulation(emulator, Referee(build_world(config, config_path), config.robot.body, start_ns))
+    referee = Referee(build_world(config, config_path), config.robot.body, start_ns)
+    lost_s = build_faults(config, config_path).feedback_lost_s
+    return Simulation(emulator, referee, None if lost_s is None else start_ns + round(lost_s * NS_PER_S))
 
 
 def build_world(config: AppConfig, config_path: FilePath) -> World:
     """The scenario that is simulated. Raises ConfigError."""
     assert config.simulation is not None, "AppConfig asks for a simulation"
     return World(scenario_of(config.simulation, config_path), config.simulation.seed)
+
+
+def build_still_world(config: AppConfig, config_path: FilePath) -> World:
+    """The scenario that is simulated without its movers. Raises ConfigError."""
+    assert config.simulation is not None, "AppConfig asks for a simulation"
+    scenario = scenario_of(config.simulation, config_path)
+    still = tuple(body for body in scenario.bodies if body.motion is None)
+    return World(scenario.model_copy(update={"bodies": still}))
 
 
 def surroundings(config: AppConfig) -> Surroundings:
@@ -242,49 +272,6 @@ def _refuse_topics(folder: FilePath, wanted: WantedTopics | None) -> None:
         raise BadRecording(
             f"{folder}: is no ROS bag, so it has no topics; leave out colour-topic and the like"
         )
-
-
-def build_replay_perceiver(
-    config: ReplayConfig,
-    mount: CameraMount | None,
-    odometry: OdometrySource | None,
-    stopwatch_ns: Callable[[], int],
-) -> Perceiver:
-    """Perception for a recording; the robot is at the origin in every frame."""
-    limit_vision_threads()
-    body = config.robot.body
-    perception = Perception(config.perception, mount, body.height_m, body.clearance_m)
-    return Perceiver(perception, odometry, lambda _stamp_ns: _ORIGIN, stopwatch_ns)
-
-
-def build_replay_decision(
-    config: ReplayConfig, mount: CameraMount | None, fps: float | None
-) -> DecisionMaker:
-    """The decision for each frame; an unknown mounting is assumed to be level, at the robot's front.
-
-    fps: of the recording; None if not known.
-    """
-    front_m = config.robot.body.front_m
-    level = CameraMount(front_m, 0.0, config.robot.camera_mount.height_m, 0.0)
-    noise = config.perception.depth_noise
-    return DecisionMaker(config.decision, config.robot, mount or level, 1.0 / _replay_fps(fps), noise)
-
-
-def _replay_fps(fps: float | None) -> float:
-    return REPLAY_FPS if fps is None else max(fps, _LEAST_FPS)
-
-
-def replay_surroundings(config: ReplayConfig, mount: CameraMount | None, fps: float | None) -> Surroundings:
-    """What a replay's video shows around the observations. fps: of the recording; None if not known."""
-    return Surroundings(
-        mount,
-        config.robot.body if mount is not None else None,
-        config.robot.body.width_m / 2.0 + config.decision.margins.lateral_m,
-        # Two decimal places: video containers count time in whole fractions of a second.
-        round(_replay_fps(fps), 2),
-        config.robot.limits.max_speed_mps,
-        config.perception.max_depth_m,
-    )
 
 
 def straight_ahead(robot: Robot) -> Path:

@@ -13,10 +13,10 @@ from config.chassis import (
     AnyChassisConfig,
     CanLinkConfig,
     KobukiChassisConfig,
-    PlantConfig,
     RoboclawChassisConfig,
     RoboteqChassisConfig,
 )
+from config.plant import PlantConfig
 from controller.guard import GuardedCanLink, GuardedChassis, GuardLimits
 from hal.api import CanLink, Chassis, SerialLink
 from hal.chassis.agilex import COMMANDS as AGILEX_COMMANDS

@@ -15,13 +15,8 @@ import numpy as np
 
 from config.app import ReplayConfig, load_replay
 from config.camera import OdometryChoice
-from controller.build import (
-    build_replay_decision,
-    build_replay_perceiver,
-    open_replay,
-    replay_surroundings,
-    straight_ahead,
-)
+from controller.build import open_replay, straight_ahead
+from controller.build_replay import build_replay_decision, build_replay_perceiver, replay_surroundings
 from controller.decision.decide import DecisionMaker
 from controller.decision.decision import Decision
 from controller.decision.situation import Situation

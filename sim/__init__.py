@@ -10,6 +10,5 @@ emulators/ - chassis at the other end of a link, each with a plant
 rendering/ - the camera's images of a world, and their ground truth
 contact.py - exact clearance between the robot and everything else
 simulation.py - emulator and world in one object, with a referee for contacts
-faults.py - what may go wrong in a mission
 preview.py - draws a scenario as a PNG
 """

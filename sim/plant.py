@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from config.chassis import PlantConfig
+from config.plant import PlantConfig
 from hal.chassis.tracks import TrackGeometry
 from hal.clocks import NS_PER_S
 from hal.types import PlanarPose
@@ -36,7 +36,7 @@ class TrackedPlant:
     """The true state of the base, which only the simulation knows. Deterministic: same calls, same numbers.
 
     The tracks follow their targets with first-order lag, within max_accel_mps2. The yaw rate from the tracks
-    (track_twist) is slip_factor times the true one (twist).
+    (track_twist) is slip_factor times the true one (twist), and their speed 1 + distance_slip times.
     """
 
     def __init__(self, config: PlantConfig, pose: PlanarPose | None = None, start_ns: int = 0) -> None:
@@ -44,6 +44,7 @@ class TrackedPlant:
         self._max_accel_mps2 = config.max_accel_mps2
         self._nominal = TrackGeometry(config.track_width_m)
         self._true = TrackGeometry(config.track_width_m, config.slip_factor)
+        self._distance_scale = 1.0 + config.distance_slip
         self._left = _Track()
         self._right = _Track()
         self._x_m, self._y_m, self._heading_rad = (
@@ -64,7 +65,8 @@ class TrackedPlant:
     @property
     def twist(self) -> tuple[float, float]:
         """The true (v m/s, w rad/s) of the body."""
-        return self._true.to_twist(self._left.speed_mps, self._right.speed_mps)
+        v_mps, w_radps = self._true.to_twist(self._left.speed_mps, self._right.speed_mps)
+        return v_mps / self._distance_scale, w_radps
 
     @property
     def track_twist(self) -> tuple[float, float]:
@@ -99,7 +101,8 @@ class TrackedPlant:
     def _advance(self, dt_s: float) -> None:
         left_m = self._left.advance(dt_s, self._lag_s, self._max_accel_mps2)
         right_m = self._right.advance(dt_s, self._lag_s, self._max_accel_mps2)
-        distance_m, turn_rad = self._true.to_twist(left_m, right_m)
+        travel_m, turn_rad = self._true.to_twist(left_m, right_m)
+        distance_m = travel_m / self._distance_scale
         # The chord of such a short arc equals its length to 1e-9, and has the direction of its middle.
         middle_rad = self._heading_rad + 0.5 * turn_rad
         self._x_m += distance_m * math.cos(middle_rad)

@@ -76,10 +76,14 @@ class Referee:
 
 class Simulation:
     """Emulator and referee together. A context manager that opens and closes the emulator's end of the
-    link."""
+    link.
 
-    def __init__(self, emulator: Emulator, referee: Referee) -> None:
+    feedback_lost_ns: from then on the base neither hears nor answers; None: never.
+    """
+
+    def __init__(self, emulator: Emulator, referee: Referee, feedback_lost_ns: int | None = None) -> None:
         self._emulator = emulator
+        self._feedback_lost_ns = feedback_lost_ns
         self._next_check_ns = 0
         self.referee = referee
 
@@ -100,6 +104,8 @@ class Simulation:
     def advance_to(self, now_ns: int) -> None:
         """Advance everything outside to now_ns."""
         self._emulator.advance_to(now_ns)
+        if self._feedback_lost_ns is not None and now_ns >= self._feedback_lost_ns:
+            self._emulator.freeze()
         if now_ns >= self._next_check_ns:
             self.referee.watch(self.body_pose, now_ns)
             self._next_check_ns = now_ns + CHECK_PERIOD_NS

@@ -1,6 +1,7 @@
 """Thousands of closed-loop missions, driven by several policies and judged against an oracle.
 
 command.py - `treadwatch campaign`
+own_scenarios.py - scenario files of one's own, beside the families
 plan.py - which missions, and on which processes they run
 store.py - missions.jsonl, which can be resumed
 task.py - one mission with all its policies

@@ -9,22 +9,18 @@ from __future__ import annotations
 import math
 import time
 from contextlib import ExitStack
-from dataclasses import replace
 from pathlib import Path as FilePath
 from tempfile import TemporaryDirectory
-from typing import Protocol, runtime_checkable
-
-import numpy as np
-import yaml
 
 from config.app import AppConfig, LockstepRunner, SimulationConfig
+from config.scenario import as_yaml
 from controller.answer import BaseAnswer
 from controller.build import (
     build_path,
     build_perceiver,
     build_simulation,
     mount_of,
-    open_simulated_camera,
+    open_faulty_camera,
     surroundings,
 )
 from controller.build_chassis import build_base
@@ -41,85 +37,44 @@ from controller.lockstep import run_lockstep
 from controller.path.path import Path
 from controller.record.recorder import RecordingOptions, RunRecorder, open_recorder
 from controller.record.tally import SetpointTally
+from controller.scenario_faults import with_slip_and_vibration
 from controller.shape import SpeedShaper
 from hal.api import Chassis
 from hal.clocks import NS_PER_S, SimulatedClock
-from hal.types import ChassisMode, PlanarPose, RgbdFrame
-from sim.faults import Faults
-from sim.rendering.camera import SimulatedCamera
+from hal.types import ChassisMode, PlanarPose
 from sim.simulation import Simulation
 
 _STANDING_MPS = 1e-3
 _NO_RECORDING = RecordingOptions(timed=False)
 
 
-@runtime_checkable
-class _Freezable(Protocol):
-    def freeze(self) -> None: ...
-
-
-class FaultyCamera:
-    """A simulated camera with faults; a FrameSource for the lockstep runner."""
-
-    def __init__(self, camera: SimulatedCamera, faults: Faults, glass_ids: tuple[int, ...]) -> None:
-        self._camera, self._faults, self._glass_ids = camera, faults, glass_ids
-        self._last: RgbdFrame | None = None
-
-    @property
-    def next_capture_ns(self) -> int:
-        """The time of the next frame that is not lost."""
-        silent = self._faults.silent
-        while silent is not None and silent.contains(self._camera.next_capture_ns / NS_PER_S):
-            self._camera.lose_frame()
-        return self._camera.next_capture_ns
-
-    def read(self, timeout_s: float) -> RgbdFrame:
-        """The next frame, with faults, as perception gets it. Raises FrameTimeout."""
-        frame = self._camera.read(timeout_s)
-        frozen = self._faults.frozen
-        if frozen is not None and self._last is not None and frozen.contains(frame.captured_ns / NS_PER_S):
-            frame = replace(frame, colour=self._last.colour, depth=self._last.depth)
-        elif self._glass_ids:
-            frame = self._without_glass_depth(frame)
-        self._last = frame
-        return frame
-
-    def _without_glass_depth(self, frame: RgbdFrame) -> RgbdFrame:
-        """The frame without depth on glass."""
-        picture = self._camera.last_picture
-        assert picture is not None, "a frame that was read has a picture behind it"
-        glass = np.isin(picture.instance_mask(), self._glass_ids)
-        return replace(frame, depth=np.where(glass, np.uint16(0), frame.depth))
-
-
 def drive_camera(stage: Stage, config: AppConfig, policy: str, keep: FilePath | None = None) -> DriveLog:
     """Drive once. keep: folder for the recording, the observations and the video; None: none are written."""
-    with TemporaryDirectory(prefix="treadwatch-") as folder:
+    try:
+        temporary = TemporaryDirectory(prefix="treadwatch-")
+    except OSError as error:
+        raise UserError(
+            f"no temporary folder can be made ({error.strerror}); set TMPDIR to one that can be written"
+        ) from error
+    with temporary as folder:
         scenario = FilePath(folder) / "scenario.yaml"
-        scenario.write_text(scenario_yaml(stage), encoding="utf-8")
+        scenario.write_text(as_yaml(stage.case.scenario), encoding="utf-8")
         return _drive(stage, _mission_config(config, stage, scenario), scenario, policy, keep)
 
 
-def scenario_yaml(stage: Stage) -> str:
-    """The mission's world as YAML, as `treadwatch run --scenario` reads it."""
-    content = stage.case.scenario.model_dump(mode="json", exclude_none=True)
-    return yaml.safe_dump(content, sort_keys=False)
-
-
 def _mission_config(config: AppConfig, stage: Stage, scenario: FilePath) -> AppConfig:
-    """The configuration with this mission's world and slip."""
+    """The configuration with this mission's world, slip and vibration."""
     assert isinstance(config.runner, LockstepRunner), "checked by controller/campaign/command.py"
-    faults = stage.case.faults
     simulation = config.simulation or SimulationConfig(scenario=str(scenario))
-    plant = simulation.plant.model_copy(update={"slip_factor": 1.0 / (1.0 - faults.yaw_slip)})
-    changed = {"scenario": str(scenario), "seed": stage.case.seed, "plant": plant}
+    changed = {"scenario": str(scenario), "seed": stage.case.seed}
     runner = {"max_duration_s": stage.case.scenario.duration_s}
-    return config.model_copy(
+    mission = config.model_copy(
         update={
             "simulation": simulation.model_copy(update=changed),
             "runner": config.runner.model_copy(update=runner),
         }
     )
+    return with_slip_and_vibration(mission, stage.case.faults)
 
 
 def _drive(
@@ -131,17 +86,16 @@ def _drive(
     chassis, emulator = build_base(config, path.start, clock.now_ns())
     assert emulator is not None, "lock-step is refused by AppConfig without an emulated base"
     simulation = build_simulation(config, scenario, emulator, clock.now_ns())
-    true_camera = open_simulated_camera(
+    camera = open_faulty_camera(
         config, scenario, clock, lambda _stamp_ns: simulation.body_pose, clock.now_ns()
     )
-    camera = FaultyCamera(true_camera, stage.case.faults, _glass_ids(stage))
     loop = _control_loop(stage, config, policy, path, chassis)
     options = _NO_RECORDING if keep is None else prepare_recording(keep, stage)
     log = DriveLog(SetpointTally(config.robot.limits, 1.0 / config.runner.control_rate_hz))
     with ExitStack() as devices:
         devices.enter_context(simulation)
         devices.enter_context(chassis)
-        devices.enter_context(true_camera)
+        devices.enter_context(camera)
         recorder = RunRecorder(devices.enter_context(open_recorder(options, surroundings(config))), path)
         perceiver = build_perceiver(config, loop.localiser, loop.localiser.body_pose, time.perf_counter_ns)
         monitor = _ProgressMonitor(stage, simulation, log)
@@ -152,7 +106,6 @@ def _drive(
                 recorder.add_look(look)
             recorder.add_step(moment.control)
             t_s = moment.control.now_ns / NS_PER_S
-            _freeze_if_feedback_lost(emulator, stage, t_s)
             armed = moment.control.chassis.mode is ChassisMode.ARMED
             monitor.step(t_s, armed)
             log.add(t_s, simulation.body_pose, monitor.s_m, monitor.v_mps, moment.control.decision)
@@ -163,13 +116,6 @@ def _drive(
     if loop.ending.outcome is Outcome.REACHED:
         log.reached_s = log.times_s[-1] - SETTLE_S - monitor.armed_s
     return log
-
-
-def _freeze_if_feedback_lost(emulator: object, stage: Stage, t_s: float) -> None:
-    """Freeze the emulator, so that it reports nothing, once the mission's fault takes its feedback away."""
-    lost_s = stage.case.faults.feedback_lost_s
-    if lost_s is not None and t_s >= lost_s and isinstance(emulator, _Freezable):
-        emulator.freeze()
 
 
 def _control_loop(stage: Stage, config: AppConfig, policy: str, path: Path, chassis: Chassis) -> ControlLoop:
@@ -191,18 +137,12 @@ def prepare_recording(folder: FilePath, stage: Stage) -> RecordingOptions:
     UserError."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        (folder / "scenario.yaml").write_text(scenario_yaml(stage), encoding="utf-8")
+        (folder / "scenario.yaml").write_text(as_yaml(stage.case.scenario), encoding="utf-8")
     except OSError as error:
         raise UserError(f"{folder}: cannot be written ({error.strerror}); choose another --report") from error
     return RecordingOptions(
         folder / "observations.jsonl", folder / "video.mp4", folder / "recording", timed=False
     )
-
-
-def _glass_ids(stage: Stage) -> tuple[int, ...]:
-    """Values of glass bodies in instance masks: k + 1 for the scenario's k-th body."""
-    names = stage.world.names
-    return tuple(k + 1 for k, name in enumerate(names) if name in stage.case.faults.glass)
 
 
 class _ProgressMonitor:

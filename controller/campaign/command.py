@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import math
+import shlex
 import sys
 import time
 from collections.abc import Generator
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import click
 
 from config.app import AppConfig, LockstepRunner, load_app
+from config.loader import CONFIG_DIR
+from config.scenario import Scenario
 from controller.campaign.judge import Row
+from controller.campaign.own_scenarios import OwnScenario, keep_own, kept_scenarios, label_of, load_own
 from controller.campaign.plan import Mission, missions, run_local, run_on_cluster
 from controller.campaign.policies import OURS, POLICY_NAMES
 from controller.campaign.report import write_report
@@ -32,8 +36,10 @@ FAILING = "failing"
 class CampaignOptions:
     """The command line of `treadwatch campaign`.
 
-    families, policies: empty means all of them.
-    only: FAMILY:SEED, a single mission.
+    families: empty means all of them, or none where scenarios are given.
+    policies: empty means all of them.
+    only: FAMILY:SEED or FILE:SEED, a single mission.
+    scenarios: of the user's own: files, or names of those that ship.
     """
 
     config_path: Path
@@ -49,6 +55,7 @@ class CampaignOptions:
     only: str | None = None
     video: bool = False
     quiet: bool = False
+    scenarios: tuple[str, ...] = ()
 
 
 def run_campaign(options: CampaignOptions) -> int:
@@ -56,14 +63,16 @@ def run_campaign(options: CampaignOptions) -> int:
     UserError."""
     config = load_app(options.config_path)
     _check(options, config)
+    own = load_own(options.scenarios, config, options.config_path)
     if options.only is not None:
-        return _run_one(options, config, _parse_mission(options.only))
+        return _run_one(options, config, _parse_mission(options.only, own, options, config))
     assert options.report is not None
-    families = options.families or FAMILY_NAMES
+    families = (options.families or (() if own else FAMILY_NAMES)) + tuple(own)
     policies = options.policies or POLICY_NAMES
     store = MissionStore(options.report, config.model_dump_json(indent=1))
     store.begin(options.resume)
     _check_modes(options, store)
+    keep_own(options.report, own, {row.family for row in store.rows.values()})
     keep = options.report / FAILING if options.video else None
     tasks = []
     for mission in missions(options.missions, families, options.seed):
@@ -71,7 +80,9 @@ def run_campaign(options: CampaignOptions) -> int:
             name for name in policies if (mission.family, mission.seed, name) not in store.rows
         )
         if missing_policies:
-            tasks.append(Task(mission.family, mission.seed, missing_policies, options.mode, config, keep))
+            world = own[mission.family].scenario if mission.family in own else None
+            task = Task(mission.family, mission.seed, missing_policies, options.mode, config, keep)
+            tasks.append(replace(task, scenario=world))
     began_s = time.perf_counter()
     try:
         _run_all(options, tasks, store)
@@ -79,7 +90,9 @@ def run_campaign(options: CampaignOptions) -> int:
         done = f"{len(store.rows)} drives are in {store.path}" if store.rows else "no drive was done yet"
         raise Interrupted(f"{done}; the same command with --resume goes on") from None
     store.rewrite()
-    summary = write_report(options.report, store.rows.values(), command_line(options))
+    summary = write_report(
+        options.report, store.rows.values(), command_line(options), kept_scenarios(options.report)
+    )
     _print_summary(summary, len(tasks), time.perf_counter() - began_s, options.report)
     return int(any(failed(row) for row in store.rows.values() if row.policy == OURS))
 
@@ -130,24 +143,32 @@ def _check_modes(options: CampaignOptions, store: MissionStore) -> None:
         )
 
 
-def _parse_mission(text: str) -> Mission:
-    family, _, seed = text.partition(":")
-    if family not in FAMILY_NAMES or not seed.isdecimal():
+def _parse_mission(
+    text: str, own: dict[str, OwnScenario], options: CampaignOptions, config: AppConfig
+) -> tuple[Mission, Scenario | None]:
+    """The mission of --only, and its world where it is a scenario file. Raises ConfigError, UserError."""
+    family, _, seed = text.rpartition(":")
+    is_file = family.endswith((".yaml", ".yml"))
+    if not (family in FAMILY_NAMES or is_file) or not (seed.isascii() and seed.isdecimal()):
         raise UserError(
-            f"--only {text}: give FAMILY:SEED, for example crossing_left:7; families are: "
+            f"--only {text}: give FAMILY:SEED, for example crossing_left:7, or FILE.yaml:SEED; families are: "
             f"{', '.join(FAMILY_NAMES)}"
         )
-    return Mission(family, int(seed))
+    if not is_file:
+        return Mission(family, int(seed)), None
+    one = own.get(family) or next(iter(load_own((family,), config, options.config_path).values()))
+    return Mission(label_of(family), int(seed)), one.scenario
 
 
-def _run_one(options: CampaignOptions, config: AppConfig, mission: Mission) -> int:
+def _run_one(options: CampaignOptions, config: AppConfig, to_drive: tuple[Mission, Scenario | None]) -> int:
     """Run one mission in this process; write a line for each policy."""
+    mission, scenario = to_drive
     policies = options.policies or (OURS,)
     keep = None
     if options.video:
         keep = (options.report or Path("out")) / f"{mission.family}-{mission.seed}"
     task = Task(mission.family, mission.seed, policies, options.mode, config, keep, keep_all=True)
-    rows = run_task(task)
+    rows = run_task(replace(task, scenario=scenario))
     for row in rows:
         say(format_row(row))
     if keep is not None:
@@ -171,11 +192,14 @@ def format_row(row: Row) -> str:
 def command_line(options: CampaignOptions) -> str:
     """The command that repeats the campaign."""
     parts = [f"treadwatch campaign --missions {options.missions} --mode {options.mode} --seed {options.seed}"]
+    if options.config_path != CONFIG_DIR / "sim.yaml":
+        parts.append(f"--config {shlex.quote(str(options.config_path))}")
+    parts.extend(f"--scenario {shlex.quote(scenario)}" for scenario in options.scenarios)
     if options.families:
         parts.append(f"--families {','.join(options.families)}")
     if options.policies:
         parts.append(f"--policies {','.join(options.policies)}")
-    parts.append(f"--workers {options.workers} --report {options.report}")
+    parts.append(f"--workers {options.workers} --report {shlex.quote(str(options.report))}")
     return " ".join(parts)
 
 

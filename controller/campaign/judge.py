@@ -32,6 +32,7 @@ class Row:
     expected: whether the target should be reached at all.
     touched: names of the bodies of contacts at fault.
     time_s: until rest on the target; None if it was not reached.
+    min_clearance_m: inf if there is nothing to come near to.
     oracle_time_s: None if not even the oracle reaches the target.
     """
 
@@ -55,8 +56,9 @@ class Row:
     flaps: int
 
     def as_dict(self) -> dict[str, object]:
-        """The row as a dictionary for JSON."""
-        return asdict(self)
+        """The row as a dictionary for JSON, which has no infinity: null."""
+        clearance_m = self.min_clearance_m if math.isfinite(self.min_clearance_m) else None
+        return {**asdict(self), "min_clearance_m": clearance_m}
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +87,7 @@ def judge(stage: Stage, log: DriveLog, policy: str, mode: str, reference: JudgeR
         policy=policy,
         mode=mode,
         reached=log.reached_s is not None,
-        expected=case.scenario.outcome == "target" and not case.halts,
+        expected=case.expects_arrival,
         contacts=len(contacts),
         contacts_at_fault=len(faulty),
         touched=tuple(stage.world.names[contact.body] for contact in faulty),
@@ -133,7 +135,7 @@ def false_stops(stage: Stage, log: DriveLog) -> list[float]:
         t0, t1 = log.times_s[start] - _BEFORE_STOP_S, log.times_s[end] + _AFTER_STOP_S
         if stage.case.faults.demands_stop(log.times_s[start], _AFTER_FAULT_S):
             continue
-        if stage.case.faults.glass and stage.case.scenario.outcome == "blocked":
+        if stage.case.glass and stage.case.scenario.outcome == "blocked":
             continue
         times = np.arange(max(t0, 0.0), t1, 0.2)
         s_m = log.s_m[start]

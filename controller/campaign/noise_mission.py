@@ -86,9 +86,9 @@ class _DelayedCamera:
         """Expose one frame. odometry_pose: the pose by odometry."""
         faults = self._faults
         self._frame += 1
-        if faults.silent is not None and faults.silent.contains(t_s):
+        if faults.is_silent(t_s):
             return
-        if faults.frozen is not None and faults.frozen.contains(t_s) and self._last is not None:
+        if faults.is_frozen(t_s) and self._last is not None:
             scene = self._repeat_scene(self._last, t_s)
         else:
             self._repeats = 0
@@ -129,7 +129,7 @@ class _NoiseDrive:
         self._dt_s = 1.0 / config.runner.control_rate_hz
         random = np.random.default_rng((seed, 0xB0))
         scale_error = _ODOMETRY_SIGMA * float(random.standard_normal())
-        self._odometry_scale = 1.0 + self._faults.distance_slip + scale_error
+        self._odometry_scale = 1.0 + (self._faults.distance_slip or 0.0) + scale_error
         steps = math.ceil(stage.case.scenario.duration_s / self._dt_s)
         self._lateral_offsets_m = _lateral_noise(random.standard_normal(steps + 1)[:-1], self._dt_s)
         self._camera_link = _DelayedCamera(

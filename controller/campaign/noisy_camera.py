@@ -49,7 +49,7 @@ class NoisyCamera:
         mount = stage.robot.camera_mount
         self.planar_camera = PlanarCamera(stage.world, camera, mount, stage.robot.body.height_m)
         self._random = np.random.default_rng((seed, 0xCA))
-        glass = np.array([name in stage.case.faults.glass for name in stage.world.names], np.bool_)
+        glass = np.array([name in stage.case.glass for name in stage.world.names], np.bool_)
         self._glass, self._has_depth = glass, stage.in_height & ~glass
         # A body that hangs above the robot is not an obstacle.
         is_obstacle = ~glass & (stage.world.z_m[:, 0] < stage.robot.body.height_m)

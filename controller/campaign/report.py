@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import cv2
 
+from config.faults import Faults
+from config.scenario import Scenario
 from controller.campaign.figures import clearance_figure, family_figure, ratio_figure
 from controller.campaign.judge import Row
+from controller.campaign.own_scenarios import KEPT
 from controller.campaign.summary import Summary, Totals, summarise
 from controller.errors import UserError
 from controller.evaluation import markdown
@@ -18,16 +21,26 @@ from controller.evaluation import markdown
 _MAX_FAILED_ROWS = 40
 
 
-def write_report(folder: Path, rows: Iterable[Row], command: str) -> Summary:
-    """Write everything except missions.jsonl. command: the command that repeats it. Raises UserError."""
+def write_report(
+    folder: Path, rows: Iterable[Row], command: str, own: Mapping[str, Scenario] | None = None
+) -> Summary:
+    """Write everything except missions.jsonl. Raises UserError.
+
+    command: the command that repeats it. own: the scenario files that were driven, by their names.
+    """
     rows = list(rows)
     summary = summarise(rows)
-    content = {"command": command, "missions": len({(row.family, row.seed) for row in rows})}
+    driven = driven_rows(rows, own or {})
+    content = {
+        "command": command,
+        "missions": len({(row.family, row.seed) for row in rows}),
+        "driven": [dict(zip(_DRIVEN_HEADER, one, strict=True)) for one in driven],
+    }
     try:
         (folder / "summary.json").write_text(
             json.dumps({**content, **summary.as_dict()}, indent=2) + "\n", encoding="utf-8"
         )
-        (folder / "report.md").write_text("\n".join(report_lines(summary, command)), encoding="utf-8")
+        (folder / "report.md").write_text("\n".join(report_lines(summary, command, driven)), encoding="utf-8")
     except OSError as error:
         raise UserError(f"{folder}: the report cannot be written ({error.strerror})") from error
     for name, image in (
@@ -40,9 +53,44 @@ def write_report(folder: Path, rows: Iterable[Row], command: str) -> Summary:
     return summary
 
 
-def report_lines(summary: Summary, command: str) -> list[str]:
+def driven_rows(rows: Iterable[Row], own: Mapping[str, Scenario]) -> list[list[str]]:
+    """What was driven: family or file, what it is, its seeds, and how many missions."""
+    seeds: dict[str, set[int]] = {}
+    for row in rows:
+        seeds.setdefault(row.family, set()).add(row.seed)
+    return [
+        [family, _what_it_is(family, own), _seeds_in_words(found), str(len(found))]
+        for family, found in seeds.items()
+    ]
+
+
+def _what_it_is(family: str, own: Mapping[str, Scenario]) -> str:
+    if family not in own:
+        return "family"
+    scenario = own[family]
+    faults = [name for name in Faults.model_fields if getattr(scenario.faults, name) not in (None, ())]
+    glass = [body.name for body in scenario.bodies if body.glass]
+    parts = [f"{KEPT}/{family}", " ".join(scenario.description.split())]
+    parts += [f"faults: {', '.join(faults)}"] if faults else []
+    parts += [f"glass: {', '.join(glass)}"] if glass else []
+    return "; ".join(part for part in parts if part)
+
+
+def _seeds_in_words(seeds: set[int]) -> str:
+    return str(min(seeds)) if len(seeds) == 1 else f"{min(seeds)} to {max(seeds)}"
+
+
+def report_lines(summary: Summary, command: str, driven: list[list[str]]) -> list[str]:
     """The report as Markdown."""
     lines = ["# Campaign", "", f"    {command}", ""]
+    lines += markdown.section(
+        "What was driven",
+        """A family makes a world for each seed. A scenario file is one world: its seeds change the noise of
+        the sensors, textures, and the starts of movers with start_jitter_s. Yaw slip and vibration occur with
+        `--mode camera` only.""",
+    )
+    # A file name or a description may hold what ends a cell.
+    lines += markdown.table(_DRIVEN_HEADER, [[cell.replace("|", "\\|") for cell in row] for row in driven])
     lines += markdown.section(
         "Policies",
         """Time is that of the drive over that of the oracle, which knows all motions in advance; a drive that
@@ -63,7 +111,8 @@ def report_lines(summary: Summary, command: str) -> list[str]:
         lines += [f"### {number}. {family}", ""]
         lines += markdown.table(_HEADER, [[name, *_cells(one)] for name, one in by_policy.items()])
     lines += markdown.section(
-        "What failed", "Each can be driven again alone: `treadwatch campaign --only FAMILY:SEED`."
+        "What failed",
+        "Each can be driven again alone: `treadwatch campaign --only FAMILY:SEED`, or `FILE.yaml:SEED`.",
     )
     shown = [
         [family, str(seed), policy, why] for family, seed, policy, why in summary.failing[:_MAX_FAILED_ROWS]
@@ -74,6 +123,7 @@ def report_lines(summary: Summary, command: str) -> list[str]:
     return lines
 
 
+_DRIVEN_HEADER = ("name", "what", "seeds", "missions")
 _HEADER = (
     "policy", "missions", "reached", "contacts", "at fault", "median x", "p90 x", "clearance m",
     "false stops", "flaps", "reversals", "outside limits",

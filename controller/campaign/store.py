@@ -4,6 +4,7 @@ resumed."""
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -126,4 +127,6 @@ def parse_row(values: dict[str, object]) -> Row:
     touched = values.get("touched", [])
     if not isinstance(touched, list):
         raise TypeError("touched is no list")
+    if "min_clearance_m" in values and values["min_clearance_m"] is None:
+        values = {**values, "min_clearance_m": math.inf}
     return Row(**{**values, "touched": tuple(touched)})  # type: ignore[arg-type]  # Row has the last word

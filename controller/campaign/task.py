@@ -12,6 +12,7 @@ from typing import Literal
 
 from config.app import AppConfig, LockstepRunner
 from config.camera import SimulatedCameraConfig
+from config.scenario import Scenario
 from controller.campaign import oracle
 from controller.campaign.camera_mission import drive_camera
 from controller.campaign.judge import JudgeReference, Row, judge
@@ -20,7 +21,7 @@ from controller.campaign.noisy_camera import NoiseModel
 from controller.campaign.policies import build_policy
 from controller.campaign.stage import Stage, sight_limited_speed_mps
 from controller.campaign.view import PlanarCamera
-from sim.families import generate
+from sim.families import Case, generate
 
 Mode = Literal["noise", "camera"]
 
@@ -31,6 +32,7 @@ class Task:
 
     keep: folder for recording and video of failed drives in camera mode; None: none are written.
     keep_all: write those of all drives.
+    scenario: the world, where it is a user's own and no family's.
     """
 
     family: str
@@ -40,11 +42,19 @@ class Task:
     config: AppConfig
     keep: FilePath | None = None
     keep_all: bool = False
+    scenario: Scenario | None = None
+
+    @property
+    def case(self) -> Case:
+        """What is driven."""
+        if self.scenario is not None:
+            return Case(self.family, self.seed, self.scenario)
+        return generate(self.family, self.seed)
 
 
 def run_task(task: Task) -> list[Row]:
     """A row for each policy, in their order. The same task gives the same rows on every machine."""
-    stage = Stage(generate(task.family, task.seed), task.config.robot)
+    stage = Stage(task.case, task.config.robot)
     reference = judge_reference(stage, task.config)
     return [_run(task, stage, policy, reference) for policy in task.policies]
 

@@ -20,10 +20,10 @@ from config.chassis import (
     AgilexChassisConfig,
     AnyChassisConfig,
     CanLinkConfig,
-    PlantConfig,
     SerialLinkConfig,
 )
 from config.loader import CONFIG_DIR, describe
+from config.plant import PlantConfig
 from controller.build_chassis import build_can_emulator, build_pseudo_terminal, build_serial_emulator
 from controller.errors import UserError
 from controller.realtime.service import StopRequest, stop_on_signals

@@ -101,10 +101,18 @@ def evaluate(
 @click.command()
 @config_option("of robot, camera, chassis, perception and decision")
 @click.option(
-    "--missions", type=WholeNumber(min=1), default=260, show_default=True,
-    help="How many, spread evenly over the families.",
+    "--missions", type=WholeNumber(1, 1_000_000), default=260, show_default=True,
+    help="How many, spread evenly over the families or scenarios, each with seeds of its own.",
 )  # fmt: skip
-@click.option("--families", metavar="A,B,...", help="Scenario families; all of them by default.")
+@click.option(
+    "--families",
+    metavar="A,B,...",
+    help="Scenario families; all of them by default, or with --scenario none.",
+)
+@click.option(
+    "--scenario", "scenarios", multiple=True, metavar="FILE",
+    help="Your own world, or the name of one that ships, in place of the families; may be repeated.",
+)  # fmt: skip
 @click.option("--policies", metavar="A,B,...", help="ours, paper, zones, field; all of them by default.")
 @perception_mode("noise")
 @click.option(
@@ -120,13 +128,14 @@ def evaluate(
 @click.option(
     "--scheduler", metavar="ADDRESS", help="Run on a Dask cluster, for example tcp://10.0.0.5:8786."
 )
-@click.option("--only", metavar="FAMILY:SEED", help="One mission alone.")
+@click.option("--only", metavar="FAMILY:SEED", help="One mission alone; also FILE.yaml:SEED.")
 @click.option("--video", is_flag=True, help="Camera mode: keep recordings and videos of what fails.")
 @no_progress_bar
 def campaign(
     config_path: Path,
     missions: int,
     families: str | None,
+    scenarios: tuple[str, ...],
     policies: str | None,
     mode: Literal["noise", "camera"],
     workers: int,
@@ -146,7 +155,7 @@ def campaign(
 
     options = CampaignOptions(
         config_path, missions, _names("--families", families), _names("--policies", policies), mode, workers,
-        seed, report, resume, scheduler, only, video, quiet,
+        seed, report, resume, scheduler, only, video, quiet, scenarios,
     )  # fmt: skip
     sys.exit(run_campaign(options))
 

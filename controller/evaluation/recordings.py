@@ -17,7 +17,8 @@ import numpy as np
 
 from config.app import ReplayConfig
 from config.camera import OdometryChoice
-from controller.build import build_replay_perceiver, open_replay
+from controller.build import open_replay
+from controller.build_replay import build_replay_perceiver
 from controller.errors import UserError
 from controller.evaluation.ours import detection_of
 from controller.evaluation.run_sequence import Snapshot

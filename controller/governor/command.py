@@ -20,6 +20,7 @@ from controller.realtime.rig import realtime_rig
 from controller.realtime.service import ServiceManager
 from controller.record.observations import STANDARD_OUTPUT
 from controller.record.tally import SetpointTally
+from controller.scenario_faults import unused_faults_warning, with_scenario_faults
 from controller.terminal.console import Console
 from controller.terminal.summary import drive_rows
 
@@ -43,11 +44,15 @@ def run_governor(options: MissionOptions) -> int:
     Raises ConfigError, HalError, UserError.
     """
     config = with_overrides(load_app(options.config_path), options)
+    config = with_scenario_faults(config, options.config_path)
     if config.governor is None:
         raise UserError(f"{options.config_path}: has no 'governor' section; add one (docs/governor.md)")
     assert isinstance(config.runner, RealtimeRunner), "a governor in lock-step is refused by AppConfig"
     console = Console(options.quiet, aside=options.observations == STANDARD_OUTPUT)
     require_possible_world(config, options.config_path)
+    warning = unused_faults_warning(config, options.config_path)
+    if warning is not None:
+        console.warning(warning)
     governing = _govern(config, config.governor, config.runner, options, console)
     console.summary(_summary_rows(config, governing))
     return 0 if governing.succeeded else 1

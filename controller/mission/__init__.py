@@ -4,6 +4,8 @@ The files in the order in which they come into play:
 
 * command.py - checks, drives in lock-step or in real time (realtime/mission.py), prints the summary
 * possible_world.py - refuses a simulated world in which the robot cannot drive
+* short_arcs.py - warns of arcs whose angle was given in radians
+* close_by.py - warns of what stands too near to the path of a simulation
 * blind_bends.py - warns of bends that the camera cannot see round
 * result.py - the options of a drive; its result, added up from step to step
 """

@@ -9,10 +9,11 @@ from pathlib import Path as FilePath
 from config.app import AppConfig, LockstepRunner, load_app
 from controller.build import (
     build_control,
+    build_faults,
     build_path,
     build_perceiver,
     build_simulation,
-    open_simulated_camera,
+    open_faulty_camera,
     surroundings,
 )
 from controller.build_chassis import build_base
@@ -20,13 +21,16 @@ from controller.ending import Outcome
 from controller.errors import UserError
 from controller.lockstep import run_lockstep
 from controller.mission.blind_bends import blind_bend_warning
+from controller.mission.close_by import close_by_warning
 from controller.mission.possible_world import require_possible_world
 from controller.mission.result import MissionOptions, MissionResult
+from controller.mission.short_arcs import short_arc_warning
 from controller.realtime.mission import drive_realtime
 from controller.realtime.service import StopRequest
 from controller.record.observations import STANDARD_OUTPUT
 from controller.record.recorder import RecordingOptions, RunRecorder, open_recorder
 from controller.record.tally import SetpointTally
+from controller.scenario_faults import unused_faults_warning, with_scenario_faults
 from controller.terminal.console import Console
 from controller.terminal.summary import report, summary_rows
 from hal.clocks import SimulatedClock
@@ -38,15 +42,17 @@ def run_mission(options: MissionOptions) -> int:
     Raises ConfigError, HalError, UserError.
     """
     config = with_overrides(load_app(options.config_path), options)
+    config = with_scenario_faults(config, options.config_path)
     if config.governor is not None:
         raise UserError(
             f"{options.config_path}: has a 'governor' and no path to drive; use `treadwatch govern`"
         )
     console = Console(options.quiet, aside=options.observations == STANDARD_OUTPUT)
     require_possible_world(config, options.config_path)
-    warning = blind_bend_warning(config, options.config_path)
-    if warning is not None:
-        console.warning(warning)
+    for told in (short_arc_warning, close_by_warning, blind_bend_warning, unused_faults_warning):
+        warning = told(config, options.config_path)
+        if warning is not None:
+            console.warning(warning)
     if isinstance(config.runner, LockstepRunner):
         result = drive_lockstep(config, config.runner, options, console)
     else:
@@ -85,7 +91,7 @@ def drive_lockstep(
     chassis, emulator = build_base(config, path.start, clock.now_ns())
     assert emulator is not None, "lock-step is refused by AppConfig without an emulated base"
     simulation = build_simulation(config, options.config_path, emulator, clock.now_ns())
-    camera = open_simulated_camera(
+    camera = open_faulty_camera(
         config, options.config_path, clock, lambda _stamp_ns: simulation.body_pose, clock.now_ns()
     )
     # Recordings must be repeatable, so durations that were measured on this machine are left out of them.
@@ -103,7 +109,8 @@ def drive_lockstep(
         perceiver = build_perceiver(config, loop.localiser, loop.localiser.body_pose, time.perf_counter_ns)
         run_recorder = RunRecorder(recorder, path)
         began_s = time.perf_counter()
-        for moment in run_lockstep(runner, clock, simulation, camera, perceiver, loop):
+        late_by = build_faults(config, options.config_path).late_by
+        for moment in run_lockstep(runner, clock, simulation, camera, perceiver, loop, late_by):
             step = moment.control
             result.take(step)
             for look in moment.looks:

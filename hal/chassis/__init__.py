@@ -6,6 +6,7 @@ command.py - checks and limits a setpoint before it is sent
 arming.py - the arming state machine
 following.py - checks that the base follows its commands
 rolling_back.py - checks that the base does not roll backwards
+low_battery.py - tells of a voltage that stays low
 tracks.py - skid-steer kinematics, dead reckoning, wrapping counters
 other_master.py - detects a second master on the same CAN bus
 disagreement.py - compares two sensors of the same motion

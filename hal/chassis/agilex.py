@@ -22,7 +22,7 @@ from hal.chassis.agilex_messages import (
     decode,
     encode,
 )
-from hal.chassis.agilex_models import model_of, over_serial
+from hal.chassis.agilex_models import battery_low_v_of, model_of, over_serial
 from hal.chassis.arming import ArmingLimits
 from hal.chassis.command import CommandLimits, due, is_zero, zero
 from hal.chassis.driver import ChassisDriver
@@ -77,7 +77,7 @@ class AgilexChassis(ChassisDriver):
             arming_timeout_ns=config.arming_timeout_ms * NS_PER_MS,
             max_step_gap_ns=model.base_timeout_ms * NS_PER_MS,
         )
-        super().__init__(link, feedback, commands, limits)
+        super().__init__(link, feedback, commands, limits, battery_low_v_of(config))
         self._link = link
         self._model = model
         self._command_mode = model.command_mode(over_serial(config))

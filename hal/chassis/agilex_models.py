@@ -45,6 +45,7 @@ class AgilexModel:
     mode_period_ms: how often 0x421 must be repeated while driving. None: once is enough, and repeating it
         would take a base that restarted out of standby without anybody's consent.
     track_width_m: between the centres of the tracks or wheels; None where no manual gives it.
+    battery_low_v: below this the battery is low; None where no manual gives it.
     """
 
     name: str
@@ -61,6 +62,7 @@ class AgilexModel:
     base_timeout_ms: int = 500
     mode_period_ms: int | None = None
     track_width_m: float | None = None
+    battery_low_v: float | None = None
 
     def command_mode(self, over_serial: bool) -> int:
         """The value of 0x211 byte 1 while the base takes commands from this wire. Raises ValueError if the
@@ -141,6 +143,7 @@ SCOUT = AgilexModel(
         }
     ),
     track_width_m=0.576,
+    battery_low_v=22.5,
 )
 
 # Limits: the vendor's SDK. Its fault table was not found.
@@ -167,6 +170,7 @@ TRACER = AgilexModel(
             0x0400: "remote control lost",
         }
     ),
+    battery_low_v=22.5,
 )
 
 MODELS: Mapping[str, AgilexModel] = MappingProxyType(
@@ -188,4 +192,11 @@ def track_width_of(config: AgilexChassisConfig) -> float | None:
     """The configured width, or the model's if the key is absent; None if unknown, or configured as null."""
     return (
         config.track_width_m if "track_width_m" in config.model_fields_set else model_of(config).track_width_m
+    )
+
+
+def battery_low_v_of(config: AgilexChassisConfig) -> float | None:
+    """The configured voltage, or the model's if the key is absent; None: no voltage is known to be low."""
+    return (
+        config.battery_low_v if "battery_low_v" in config.model_fields_set else model_of(config).battery_low_v
     )

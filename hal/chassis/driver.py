@@ -17,6 +17,7 @@ from hal.chassis import arming
 from hal.chassis.arming import Arming, ArmingLimits, Evidence
 from hal.chassis.command import CommandLimits, is_zero, zero
 from hal.chassis.following import Following
+from hal.chassis.low_battery import LowBattery
 from hal.chassis.rolling_back import RollingBack
 from hal.clocks import NS_PER_MS, NS_PER_S
 from hal.errors import LinkLost
@@ -68,8 +69,14 @@ class ChassisDriver(ABC):
     """hal.api.Chassis without the protocol."""
 
     def __init__(
-        self, link: Device, feedback: ChassisFeedback, commands: CommandLimits, limits: ArmingLimits
+        self,
+        link: Device,
+        feedback: ChassisFeedback,
+        commands: CommandLimits,
+        limits: ArmingLimits,
+        battery_low_v: float | None = None,
     ) -> None:
+        """battery_low_v: the operator is told where the battery stays below it; None: never."""
         self._device = link
         self._reported = feedback
         self._commands = commands
@@ -77,6 +84,7 @@ class ChassisDriver(ABC):
         self._arming = Arming()
         self._following = Following()
         self._rolling_back = RollingBack()
+        self._low_battery = LowBattery(battery_low_v)
         self._reverse_allowed = True
         self._requested: Setpoint | None = None
         self._setpoint_error = ""
@@ -104,6 +112,7 @@ class ChassisDriver(ABC):
         self._requested = setpoint
         self._setpoint_error = self._commands.setpoint_error(setpoint, now_ns)
         self._poll_link(now_ns)
+        self._low_battery.step(self._reported.battery_v, now_ns)
         self._following.step(self._reported.pose, now_ns)
         self._rolling_back.step(self._reported.pose, now_ns, expected=self._reverse_allowed)
         self._arming = arming.step(self._arming, self._evidence(now_ns), self._limits)
@@ -234,7 +243,7 @@ class ChassisDriver(ABC):
             w_radps=feedback.w_radps,
             pose=self._pose_now(now_ns),
             battery_v=feedback.battery_v,
-            faults=feedback.faults,
+            faults=feedback.faults + ((told,) if (told := self._low_battery.sentence) else ()),
             sent=sent,
         )
 

@@ -40,8 +40,8 @@ _JUMP_SLACK_M = 0.02
 _DISAGREEMENT_RAD = 0.3
 _DISAGREEMENT_RATIO = 0.4
 
-# The vendor's driver calls the battery low and dangerously low below these (kobuki_core, battery.cpp).
-_BATTERY_LOW_V, _BATTERY_DANGEROUS_V = 14.0, 13.2
+# The vendor's driver calls the battery dangerously low below this (kobuki_core, battery.cpp).
+_BATTERY_DANGEROUS_V = 13.2
 
 # How much more time may have passed between two frames by the base's clock than by ours. Frames wait in
 # buffers: less may have passed for the base (but not less than none), and more only by the time that the
@@ -141,7 +141,7 @@ class KobukiFeedback:
         core = self._core
         if core is None:
             return ()
-        return _battery_faults(core.battery_v) + _named_bits(
+        return self._battery_faults(core.battery_v) + _named_bits(
             "error: motor over-current", core.over_current, _MOTORS
         )
 
@@ -206,6 +206,12 @@ class KobukiFeedback:
         self._counter.increments(core.left_ticks, core.right_ticks, math.inf)
         self.v_mps = self.w_radps = math.nan
 
+    def _battery_faults(self, battery_v: float) -> tuple[str, ...]:
+        low_v = self._config.battery_low_v
+        if battery_v < _BATTERY_DANGEROUS_V:
+            return (f"error: battery below {_BATTERY_DANGEROUS_V:g} V",)
+        return (f"warning: battery below {low_v:g} V",) if low_v is not None and battery_v < low_v else ()
+
     def _max_wheel_mps(self) -> float:
         config = self._config
         return config.max_speed_mps + self._geometry.to_tracks(0.0, config.max_yaw_rate_radps)[1]
@@ -217,9 +223,3 @@ def _named_bits(what: str, bits: int, names: tuple[str, ...]) -> tuple[str, ...]
         for bit in range(8)
         if bits >> bit & 1
     )
-
-
-def _battery_faults(battery_v: float) -> tuple[str, ...]:
-    if battery_v < _BATTERY_DANGEROUS_V:
-        return (f"error: battery below {_BATTERY_DANGEROUS_V:g} V",)
-    return (f"warning: battery below {_BATTERY_LOW_V:g} V",) if battery_v < _BATTERY_LOW_V else ()

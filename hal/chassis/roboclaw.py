@@ -68,7 +68,7 @@ class RoboclawChassis(ChassisDriver):
             arming_timeout_ns=config.arming_timeout_ms * NS_PER_MS,
             max_step_gap_ns=config.timeout_ms * NS_PER_MS,
         )
-        super().__init__(link, feedback, commands, limits)
+        super().__init__(link, feedback, commands, limits, config.battery_low_v)
         self._config = config
         self._geometry = geometry
         self._feedback = feedback

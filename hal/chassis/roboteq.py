@@ -65,7 +65,7 @@ class RoboteqChassis(ChassisDriver):
             arming_timeout_ns=config.arming_timeout_ms * NS_PER_MS,
             max_step_gap_ns=config.watchdog_ms * NS_PER_MS,
         )
-        super().__init__(link, feedback, commands, limits)
+        super().__init__(link, feedback, commands, limits, config.battery_low_v)
         self._link = link
         self._config = config
         self._geometry = geometry

@@ -8,45 +8,63 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from config.faults import Faults, LateWindow, Window
 from config.scenario import Scenario
 from sim.families import close_by, crossing, oncoming, same_way, standing
 from sim.families.layout import Random
-from sim.faults import NO_FAULTS, Faults, Window
+
+# The tracks of every family lose a tenth of a turn, unless its own faults say otherwise.
+USUAL_SLIP = 0.1
 
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """The world of one mission. faults: what goes wrong in it. halts: the robot must stop before its
-    target."""
+    """The world of one mission. family: its scenario family, or the file of a user's own scenario."""
 
     family: str
     seed: int
     scenario: Scenario
-    faults: Faults
-    halts: bool
+
+    @property
+    def faults(self) -> Faults:
+        """What goes wrong in it."""
+        return self.scenario.faults
+
+    @property
+    def glass(self) -> frozenset[str]:
+        """Names of the bodies that depth does not see."""
+        return frozenset(body.name for body in self.scenario.bodies if body.glass)
+
+    @property
+    def expects_arrival(self) -> bool:
+        """Whether a robot that drives well reaches its target: nothing blocks it, and its base answers."""
+        return self.scenario.outcome == "target" and self.faults.feedback_lost_s is None
 
 
 @dataclass(frozen=True, slots=True)
 class _Family:
     world: Callable[[Random], Scenario]
-    faults: Callable[[Random], Faults] = lambda _: NO_FAULTS
-    halts: bool = False
+    faults: Callable[[Random], Faults] = lambda _: Faults()
 
 
 def _silent(random: Random) -> Faults:
-    start_s = float(random.uniform(2.0, 8.0))
-    return Faults(silent=Window(start_s, start_s + float(random.uniform(0.5, 3.0))))
+    return Faults(no_frames=(_half_second_to_three(random),))
 
 
 def _frozen(random: Random) -> Faults:
+    return Faults(frozen_frames=(_half_second_to_three(random),))
+
+
+def _half_second_to_three(random: Random) -> Window:
     start_s = float(random.uniform(2.0, 8.0))
-    return Faults(frozen=Window(start_s, start_s + float(random.uniform(0.5, 3.0))))
+    return Window(start_s=start_s, end_s=start_s + float(random.uniform(0.5, 3.0)))
 
 
 def _late(random: Random) -> Faults:
     start_s = float(random.uniform(1.0, 6.0))
-    window = Window(start_s, start_s + float(random.uniform(2.0, 8.0)))
-    return Faults(late=window, late_by_s=float(random.uniform(0.05, 0.3)))
+    end_s = start_s + float(random.uniform(2.0, 8.0))
+    delay_s = float(random.uniform(0.05, 0.3))
+    return Faults(late_frames=(LateWindow(start_s=start_s, end_s=end_s, delay_s=delay_s),))
 
 
 def _slip(random: Random) -> Faults:
@@ -55,10 +73,6 @@ def _slip(random: Random) -> Faults:
 
 def _feedback(random: Random) -> Faults:
     return Faults(feedback_lost_s=float(random.uniform(2.0, 8.0)))
-
-
-def _glass(_: Random) -> Faults:
-    return Faults(glass=(standing.GLASS,))
 
 
 _FAMILIES: dict[str, _Family] = {
@@ -84,12 +98,12 @@ _FAMILIES: dict[str, _Family] = {
     "crate_beside_bend": _Family(close_by.crate_beside_bend),
     "empty_aisle": _Family(standing.empty_aisle),
     "narrow_aisle": _Family(close_by.narrow_aisle),
-    "glass_front": _Family(standing.glass_front, _glass),
+    "glass_front": _Family(standing.glass_front),
     "camera_dropout": _Family(crossing.crossing_left, _silent),
     "camera_frozen": _Family(crossing.crossing_right, _frozen),
     "odometry_slip": _Family(crossing.curved_path, _slip),
     "late_frames": _Family(crossing.crossing_left, _late),
-    "feedback_lost": _Family(crossing.crossing_right, _feedback, halts=True),
+    "feedback_lost": _Family(crossing.crossing_right, _feedback),
 }
 
 FAMILY_NAMES: tuple[str, ...] = tuple(_FAMILIES)
@@ -99,5 +113,8 @@ def generate(family: str, seed: int) -> Case:
     """The mission of a family for a seed, always the same. Raises KeyError for an unknown family."""
     entry = _FAMILIES[family]
     random = np.random.default_rng((zlib.crc32(family.encode()), seed))
-    world = entry.world(random).model_copy(update={"name": f"{family}-{seed}"})
-    return Case(family, seed, world, entry.faults(random), entry.halts)
+    world = entry.world(random)
+    faults = entry.faults(random)
+    if faults.yaw_slip is None:
+        faults = faults.model_copy(update={"yaw_slip": USUAL_SLIP})
+    return Case(family, seed, world.model_copy(update={"name": f"{family}-{seed}", "faults": faults}))

@@ -14,8 +14,6 @@ from sim.families.layout import (
     scenario,
 )
 
-GLASS = "glass front"
-
 
 def empty_aisle(random: Random) -> Scenario:
     """Nothing but racks: the robot must not slow down."""
@@ -124,11 +122,12 @@ def glass_front(random: Random) -> Scenario:
     length = float(random.uniform(12.0, 15.0))
     front: BodySpec = Wall(
         kind="wall",
-        name=GLASS,
+        name="glass front",
         x_m=float(random.uniform(8.0, length - 1.0)),
         y_m=0.0,
         heading_deg=90.0,
         length_m=6.0,
         width_m=0.05,
+        glass=True,
     )
     return scenario("glass_front", length, (front,), blocked=True, room=hall(length, 3.2))

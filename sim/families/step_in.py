@@ -6,9 +6,9 @@ import zlib
 
 import numpy as np
 
+from config.faults import Faults
 from sim.families.layout import earliest_arrival_s, go, person, racks, random_side, scenario, wait, walk
-from sim.families.registry import Case
-from sim.faults import NO_FAULTS
+from sim.families.registry import USUAL_SLIP, Case
 
 _START_OFFSET_M = 3.4
 _LENGTH_M = 16.0
@@ -33,4 +33,4 @@ def step_in(seed: int) -> Case:
     body = person(random, "person", (x, side * _START_OFFSET_M), motion)
     shelves = racks(random, _LENGTH_M, ((x - 1.5, x + 1.5),))
     world = scenario(f"step_in-{seed}", _LENGTH_M, (*shelves, body))
-    return Case("step_in", seed, world, NO_FAULTS, False)
+    return Case("step_in", seed, world.model_copy(update={"faults": Faults(yaw_slip=USUAL_SLIP)}))

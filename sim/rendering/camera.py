@@ -67,6 +67,11 @@ class SimulatedCamera:
         return self._start_ns + round(self._index * NS_PER_S / self._config.fps)
 
     @property
+    def start_ns(self) -> int:
+        """Time zero of the world, on the clock."""
+        return self._start_ns
+
+    @property
     def last_picture(self) -> Picture | None:
         """The noiseless picture of the last frame, for evaluation. Valid until the next read."""
         return self._picture

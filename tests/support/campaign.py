@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from config.app import AppConfig, load_app
+from config.faults import NO_FAULTS, Faults, LateWindow, Window
 from config.loader import CONFIG_DIR
 from config.path import LineSpec, PathSpec
 from config.robot import Robot
@@ -14,7 +15,6 @@ from controller.campaign.stage import Stage
 from controller.decision.decision import Action, Decision, Reason
 from controller.record.tally import SetpointTally
 from sim.families import Case
-from sim.faults import NO_FAULTS, Faults
 
 CONFIG: AppConfig = load_app(CONFIG_DIR / "sim.yaml")
 PERIOD_S = 0.02
@@ -25,7 +25,6 @@ def stage(
     length_m: float = 10.0,
     faults: Faults = NO_FAULTS,
     blocked: bool = False,
-    halts: bool = False,
     duration_s: float = 60.0,
 ) -> Stage:
     """A straight path along x from the origin in a wide hall."""
@@ -36,8 +35,24 @@ def stage(
         path=PathSpec(segments=(LineSpec(kind="line", length_m=length_m),)),
         room=Room(x_min_m=-30.0, x_max_m=60.0, y_min_m=-30.0, y_max_m=30.0),
         bodies=bodies,
+        faults=faults,
     )
-    return Stage(Case("made", 1, scenario, faults, halts), Robot())
+    return Stage(Case("made", 1, scenario), Robot())
+
+
+def silent(start_s: float, end_s: float) -> Faults:
+    """No frames from start_s to end_s."""
+    return Faults(no_frames=(Window(start_s=start_s, end_s=end_s),))
+
+
+def frozen(start_s: float, end_s: float) -> Faults:
+    """The same image from start_s to end_s."""
+    return Faults(frozen_frames=(Window(start_s=start_s, end_s=end_s),))
+
+
+def late(start_s: float, end_s: float, delay_s: float) -> Faults:
+    """Frames of start_s to end_s arrive delay_s late."""
+    return Faults(late_frames=(LateWindow(start_s=start_s, end_s=end_s, delay_s=delay_s),))
 
 
 def crate(

@@ -14,11 +14,11 @@ from config.chassis import (
     AgilexLinkConfig,
     CanLinkConfig,
     KobukiChassisConfig,
-    PlantConfig,
     RoboclawChassisConfig,
     RoboteqChassisConfig,
     SerialLinkConfig,
 )
+from config.plant import PlantConfig
 from hal.api import CanLink, Chassis, SerialLink
 from hal.chassis.agilex import AgilexChassis, no_can_frames_hint
 from hal.chassis.agilex_models import model_of, over_serial

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from itertools import count
 from typing import Generic, TypeVar
 
-from config.chassis import PlantConfig
+from config.plant import PlantConfig
 from hal.api import Chassis, SerialLink
 from hal.links.scripted import ScriptedSerialLink, serial_pair
 from hal.types import ChassisMode, ChassisState, Setpoint

@@ -42,6 +42,7 @@ NO_DEVICES = {
     "sim.contact",
     "sim.plant",
     "sim.simulation",
+    "sim.world",
 }
 
 

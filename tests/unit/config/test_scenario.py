@@ -93,7 +93,7 @@ def test_a_list_whose_items_are_wrong_is_not_called_empty_as_well(tmp_path: Path
     wrong = GOOD.replace("y_m: 1.0", "y_m: 1.0, motion: {steps: [{kind: wait}]}")
     with pytest.raises(ConfigError) as caught:
         load_scenario(write(tmp_path, wrong))
-    assert str(caught.value).endswith("yaml: bodies.0.motion.steps.0.duration_s: missing key")
+    assert str(caught.value).endswith("yaml: bodies.0.motion.steps.0.duration_s (crate 'crate'): missing key")
 
 
 def test_an_unknown_name_is_answered_with_the_known_ones() -> None:
@@ -110,3 +110,25 @@ def test_a_name_that_no_file_can_have_is_told(name: str) -> None:
 def test_a_missing_file_is_told(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"none\.yaml"):
         load_scenario(tmp_path / "none.yaml")
+
+
+def test_a_mistake_in_a_body_names_the_body(tmp_path: Path) -> None:
+    file = tmp_path / "named.yaml"
+    file.write_text(
+        "name: named\npath: {segments: [{kind: line, length_m: 4.0}, {kind: arc, radius_m: 3.0}]}\nbodies:\n"
+        "  - {kind: crate, name: by the door, x_m: 1.0, y_m: 0.0, height_m: -1.0}\n"
+        "  - {kind: crate, x_m: 1.0, y_m: 0.0}\n"
+        "  - {kind: person, name: walker, x_m: 0.0, y_m: 0.0, motion: {steps: [{kind: go}]}}\n"
+        "  - {kind: crat, name: odd, x_m: 1.0, y_m: 0.0}\n"
+        "  - just text\n"
+    )
+    with pytest.raises(ConfigError) as caught:
+        load_scenario(file)
+    told = str(caught.value)
+    assert "path.segments.1.angle_deg: missing key" in told
+    assert "bodies.0.height_m (crate 'by the door'): Input should be greater than 0, found -1.0" in told
+    assert "bodies.1.name (crate): missing key" in told
+    assert "bodies.2.motion.steps.0.speed_mps (person 'walker'): missing key" in told
+    assert "bodies.3 (crat 'odd'): its 'kind' is " in told
+    assert "bodies.4: " in told
+    assert "\n" not in told

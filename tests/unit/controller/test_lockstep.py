@@ -1,7 +1,7 @@
 from config.app import LockstepRunner
 from controller.lockstep import run_lockstep
 from hal.clocks import SimulatedClock
-from sim.faults import Faults, Window
+from tests.support.campaign import late
 from tests.support.runner_doubles import EmptyScenePerceiver, PeriodicCamera, RecordingDrive, RecordingOutside
 
 MS = 1_000_000
@@ -27,9 +27,9 @@ def test_a_scene_is_known_only_after_its_latency() -> None:
 def test_late_scenes_come_late_and_none_overtakes_another() -> None:
     runner = LockstepRunner(kind="lockstep", control_rate_hz=50, perception_latency_s=0.0)
     loop, camera = RecordingDrive(6), PeriodicCamera(20 * MS)
-    late = Faults(late=Window(0.02, 0.03), late_by_s=0.05)
+    faults = late(0.02, 0.03, 0.05)
     run = run_lockstep(
-        runner, SimulatedClock(), RecordingOutside(), camera, EmptyScenePerceiver(), loop, late.late_by
+        runner, SimulatedClock(), RecordingOutside(), camera, EmptyScenePerceiver(), loop, faults.late_by
     )
     assert len(list(run)) == 6
     # Frame 1, exposed at 20 ms, is known at 70: at the step at 80, together with those that came after it.

@@ -6,7 +6,7 @@ import tracemalloc
 
 import pytest
 
-from config.chassis import PlantConfig
+from config.plant import PlantConfig
 from hal.chassis.following import Following
 from hal.geometry import advance_pose
 from hal.types import PlanarPose, Setpoint

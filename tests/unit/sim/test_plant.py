@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from config.chassis import PlantConfig
+from config.plant import PlantConfig
 from hal.types import PlanarPose
 from sim.plant import TrackedPlant
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from config.app import load_app
-from config.chassis import PlantConfig
 from config.loader import CONFIG_DIR
+from config.plant import PlantConfig
 from controller.bench.busy_scene import OBSTACLES, busy_scene
 from controller.bench.driving import TimedChassis, measure_control, measure_exchange
 from controller.build import build_control, build_path

@@ -13,8 +13,7 @@ from config.scenario import load_scenario
 from controller.campaign.camera_mission import drive_camera, prepare_recording
 from controller.errors import UserError
 from controller.replay import ReplayOptions, run_replay
-from sim.faults import Faults, Window
-from tests.support.campaign import CONFIG, crate, mover, stage
+from tests.support.campaign import CONFIG, crate, mover, silent, stage
 
 
 def test_a_recording_has_the_world_beside_it_as_a_scenario_that_can_be_run(tmp_path: Path) -> None:
@@ -38,7 +37,7 @@ def movers(observations: Path) -> dict[float, list[list[float]]]:
 
 def test_what_was_seen_in_a_mission_is_seen_in_its_recording(tmp_path: Path) -> None:
     """Two seconds of it, of which the camera was silent for a third of one."""
-    faults = Faults(silent=Window(0.6, 0.9))
+    faults = silent(0.6, 0.9)
     made = stage(mover(5.0, 1.5, 5.0, -3.0, 1.0), crate(7.0, 2.0), duration_s=2.0, faults=faults)
     drive_camera(made, CONFIG, "ours", tmp_path)
     again = tmp_path / "again.jsonl"

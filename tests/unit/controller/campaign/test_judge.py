@@ -8,6 +8,7 @@ import pytest
 
 from config.app import AppConfig
 from config.camera import SimulatedCameraConfig
+from config.faults import Faults
 from config.scenario import Go, MotionPlan, RobotBody, Wait
 from controller.campaign.drive_log import DriveLog
 from controller.campaign.judge import Row, false_stops, flaps, judge
@@ -15,9 +16,8 @@ from controller.campaign.oracle import OracleTime
 from controller.campaign.stage import Stage
 from controller.campaign.task import judge_reference
 from controller.decision.decision import Action
-from sim.faults import Faults, Window
 from sim.planar import separation
-from tests.support.campaign import CONFIG, crate, log_of, mover, stage
+from tests.support.campaign import CONFIG, crate, frozen, late, log_of, mover, silent, stage
 
 UP, DOWN, KEEP = Action.INCREASE, Action.DECREASE, Action.KEEP
 
@@ -94,14 +94,14 @@ def sets_off(x_m: float, y_m: float, at_s: float, speed_mps: float) -> RobotBody
     ("faults", "at_fault"),
     [
         (Faults(), 1),
-        (Faults(silent=Window(2.95, 9.0)), 0),
-        (Faults(frozen=Window(2.95, 9.0)), 0),
-        (Faults(late=Window(0.0, 9.0), late_by_s=0.5), 0),
+        (silent(2.95, 9.0), 0),
+        (frozen(2.95, 9.0), 0),
+        (late(0.0, 9.0, 0.5), 0),
         # Two looks it takes, and these are none: one at 3.1 s, the next one after the gap.
-        (Faults(silent=Window(3.15, 3.55)), 0),
+        (silent(3.15, 3.55), 0),
         # Nobody drives on for two seconds without a picture.
-        (Faults(silent=Window(0.5, 9.0)), 1),
-        (Faults(frozen=Window(0.5, 4.0)), 1),
+        (silent(0.5, 9.0), 1),
+        (frozen(0.5, 4.0), 1),
     ],
 )
 def test_the_driver_has_no_better_eyes_than_the_robot(faults: Faults, at_fault: int) -> None:
@@ -110,7 +110,7 @@ def test_the_driver_has_no_better_eyes_than_the_robot(faults: Faults, at_fault: 
     assert (row.contacts, row.contacts_at_fault) == (1, at_fault)
 
 
-@pytest.mark.parametrize("faults", [Faults(), Faults(silent=Window(1.3, 4.35))])
+@pytest.mark.parametrize("faults", [Faults(), silent(1.3, 4.35)])
 def test_who_stood_while_nothing_was_seen_is_not_known_to_go_on(faults: Faults) -> None:
     steps = (
         Go(kind="go", x_m=4.5, y_m=1.5, speed_mps=1.5),
@@ -214,8 +214,8 @@ def test_a_stop_for_somebody_who_has_just_left_the_way_is_right() -> None:
 
 
 def test_a_stop_for_a_camera_that_says_nothing_is_right() -> None:
-    silent = Faults(silent=Window(2.5, 3.5))
-    assert false_stops(stage(length_m=20.0, faults=silent), stop_and_go(3.0, 2.0)) == []
+    blind = silent(2.5, 3.5)
+    assert false_stops(stage(length_m=20.0, faults=blind), stop_and_go(3.0, 2.0)) == []
 
 
 def test_resting_at_the_target_is_no_stop() -> None:

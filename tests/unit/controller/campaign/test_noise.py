@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from config.camera import SimulatedCameraConfig
+from config.faults import Faults
 from controller.campaign.noise_mission import drive_noise
 from controller.campaign.noisy_camera import NoiseModel, NoisyCamera, mount_of
 from controller.campaign.policies import build_policy
@@ -14,8 +15,7 @@ from controller.decision.decision import Decision
 from controller.decision.situation import Situation
 from hal.geometry import camera_in_floor
 from hal.types import PlanarPose
-from sim.faults import Faults, Window
-from tests.support.campaign import CONFIG, crate, mover, stage
+from tests.support.campaign import CONFIG, crate, frozen, late, mover, silent, stage
 from vision.scene import CameraCondition, Scene
 
 CAMERA = SimulatedCameraConfig()
@@ -157,7 +157,7 @@ def test_of_what_is_nearer_than_the_least_depth_nothing_is_measured() -> None:
 
 
 def test_glass_is_neither_obstacle_nor_surface_and_nothing_is_known_behind_it() -> None:
-    made = stage(crate(5.0, size_m=1.0), faults=Faults(glass=("crate",)))
+    made = stage(crate(5.0, size_m=1.0).model_copy(update={"glass": True}))
     last = scenes(made, 5, QUIET)[-1]
     assert last.obstacles == ()
     ahead = np.abs(last.free_space.bearing_tan) < 0.08
@@ -193,7 +193,7 @@ def test_an_empty_drive_arrives_in_little_more_than_the_s_curve_time() -> None:
 
 def test_a_silent_camera_shows_no_new_scene() -> None:
     spy = Spy()
-    drive_noise(stage(length_m=4.0, faults=Faults(silent=Window(2.0, 3.0))), CONFIG, spy)
+    drive_noise(stage(length_m=4.0, faults=silent(2.0, 3.0)), CONFIG, spy)
     old = ages(spy)
     assert max(age for t_s, age in old.items() if 2.9 < t_s < 3.0) > 0.9
     assert max(age for t_s, age in old.items() if t_s > 3.2) < 0.12
@@ -201,7 +201,7 @@ def test_a_silent_camera_shows_no_new_scene() -> None:
 
 def test_a_frozen_camera_is_not_to_be_trusted_from_its_second_repetition_on() -> None:
     spy = Spy()
-    drive_noise(stage(length_m=4.0, faults=Faults(frozen=Window(2.0, 3.0))), CONFIG, spy)
+    drive_noise(stage(length_m=4.0, faults=frozen(2.0, 3.0)), CONFIG, spy)
     trusted = {t: s.health.condition is CameraCondition.GOOD for t, s in spy.seen if s is not None}
     assert not any(good for t_s, good in trusted.items() if 2.2 < t_s < 3.0)
     assert all(good for t_s, good in trusted.items() if t_s < 2.0 or t_s > 3.2)
@@ -209,8 +209,8 @@ def test_a_frozen_camera_is_not_to_be_trusted_from_its_second_repetition_on() ->
 
 def test_late_frames_come_late() -> None:
     spy = Spy()
-    late = Faults(late=Window(2.0, 4.0), late_by_s=0.2)
-    drive_noise(stage(length_m=4.0, faults=late), CONFIG, spy)
+    delayed = late(2.0, 4.0, 0.2)
+    drive_noise(stage(length_m=4.0, faults=delayed), CONFIG, spy)
     assert min(age for t_s, age in ages(spy).items() if 2.5 < t_s < 4.0) >= 0.26 - 1e-9
 
 

@@ -9,7 +9,6 @@ import pytest
 from config.path import ArcSpec, PathSpec
 from controller.campaign.stage import Stage
 from sim.families import Case
-from sim.faults import NO_FAULTS
 from tests.support.campaign import CONFIG, stage
 
 BEND = PathSpec(segments=(ArcSpec(kind="arc", radius_m=2.0, angle_deg=90.0),))
@@ -18,7 +17,7 @@ BEND = PathSpec(segments=(ArcSpec(kind="arc", radius_m=2.0, angle_deg=90.0),))
 @pytest.mark.parametrize("s_m", [0.0, 0.013, 1.0, 3.1])
 def test_the_table_is_the_path_and_what_is_beside_it(s_m: float) -> None:
     scenario = stage().case.scenario.model_copy(update={"path": BEND})
-    pose = Stage(Case("made", 1, scenario, NO_FAULTS, False), CONFIG.robot).pose(s_m, 0.5)
+    pose = Stage(Case("made", 1, scenario), CONFIG.robot).pose(s_m, 0.5)
     angle = s_m / 2.0
     assert pose.heading_rad == pytest.approx(angle)
     assert (pose.x_m, pose.y_m) == pytest.approx(

@@ -11,7 +11,7 @@ from config.app import ReplayConfig
 from config.decision import DecisionConfig
 from config.perception import DepthNoise, PerceptionConfig
 from config.robot import Robot
-from controller.build import build_replay_decision
+from controller.build_replay import build_replay_decision
 from controller.decision.world_model import WorldModel
 from controller.path.path import OnPath
 from hal.types import PlanarPose

@@ -6,7 +6,7 @@ from collections import Counter
 
 import pytest
 
-from config.chassis import PlantConfig
+from config.plant import PlantConfig
 from hal.chassis.agilex_messages import (
     AgilexMessage,
     ControlModeCommand,

@@ -7,7 +7,7 @@ import struct
 
 import pytest
 
-from config.chassis import PlantConfig
+from config.plant import PlantConfig
 from hal.links.scripted import serial_pair
 from sim.emulators.kobuki import KobukiEmulator
 from sim.plant import TrackedPlant

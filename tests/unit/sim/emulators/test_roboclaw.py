@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from config.chassis import PlantConfig
+from config.plant import PlantConfig
 from hal.links.scripted import serial_pair
 from sim.emulators.roboclaw import RoboclawEmulator
 from sim.plant import TrackedPlant

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from config.chassis import PlantConfig
+from config.plant import PlantConfig
 from hal.links.scripted import serial_pair
 from sim.emulators.roboteq import RoboteqEmulator
 from sim.plant import TrackedPlant

@@ -1,0 +1,23 @@
+"""Arcs whose angle was most likely given in radians: a warning before the drive."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from config.app import AppConfig
+from config.path import ArcSpec
+from controller.build import path_spec
+
+
+def short_arc_warning(config: AppConfig, config_path: Path) -> str | None:
+    """One line about every arc of the path that hardly turns; None if there is none. Raises ConfigError."""
+    if config.path is None and config.simulation is None:
+        return None
+    where, spec = path_spec(config, config_path)
+    told = [
+        f"path.segments.{number}: the arc is only {segment.length_m - segment.blend_m:.2f} m long; "
+        f"{segment.in_degrees}"
+        for number, segment in enumerate(spec.segments)
+        if isinstance(segment, ArcSpec) and segment.may_be_in_radians
+    ]
+    return f"{where}: {'; '.join(told)}" if told else None
