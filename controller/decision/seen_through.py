@@ -32,6 +32,9 @@ _FOR_NS = 500_000_000
 _NEAR_M = 5.0
 # A surface within this distance of the place may be what stood there. From then on depth tells of it.
 _AT_PLACE_M = 0.3
+# Seen for less time, or last measured faster than this, a body did not surely stand, whatever the verdict: a
+# limb of somebody who walks by is judged standing for half a second.
+_STOOD_S, _STOOD_MPS = 1.0, 0.3
 # A robot that turns by more than this does not stand: turning in place sweeps the edges of the view.
 _STANDS_RAD = math.radians(0.25)
 
@@ -73,15 +76,16 @@ class SeenThrough:
 def unproven(
     bodies: Bodies, pose: PlanarPose, mount: CameraMount, edges: ViewEdges, free: FreeSpace
 ) -> NDArray[np.bool_]:
-    """(N,) which standing bodies are in view and near, but their place is not seen in this scene.
+    """(N,) which bodies that surely stood are in view and near, but their place is not seen in this scene.
 
     It is seen if every band that the body covers is free beyond it, or if one ends at a surface there.
     """
+    speed_mps = np.hypot(bodies.measured_mps[:, 0], bodies.measured_mps[:, 1])
     unseen = _unproven(
         bodies.xy_m,
         bodies.half_view_m,
         bodies.half_across_m,
-        bodies.moving,
+        ~bodies.moving & (bodies.tracked_s >= _STOOD_S) & (speed_mps <= _STOOD_MPS),
         pose.x_m,
         pose.y_m,
         pose.heading_rad,
@@ -131,7 +135,7 @@ def _unproven(
     xy_m: FloatArray,
     half_view_m: FloatArray,
     half_across_m: FloatArray,
-    moving: NDArray[np.bool_],
+    stood: NDArray[np.bool_],
     x_m: float,
     y_m: float,
     heading_rad: float,
@@ -149,7 +153,7 @@ def _unproven(
         dx, dy = xy_m[k, 0] - x_m, xy_m[k, 1] - y_m
         ahead, right = dx * cos + dy * sin - forward_m, left_m - (dy * cos - dx * sin)
         near, far = ahead - half_view_m[k], ahead + half_view_m[k]
-        if moving[k] or not 0.0 < near <= _NEAR_M:
+        if not (stood[k] and 0.0 < near <= _NEAR_M):
             continue
         left_edge, right_edge = right - half_across_m[k], right + half_across_m[k]
         first = min(left_edge / near, left_edge / far) - half_width_tan

@@ -99,6 +99,20 @@ def test_what_is_missed_in_the_middle_of_the_view_stays_until_its_place_is_seen(
         assert recall.see(None, 1.0 + 1e-3, free=free) == kept
 
 
+@pytest.mark.parametrize(
+    ("seen_s", "measured_mps", "kept"),
+    [(1.1, 0.2, [1]), (0.9, 0.2, []), (1.1, 0.4, [])],
+    ids=["stood", "seen for a moment only", "measured as moving"],
+)
+def test_what_did_not_surely_stand_does_not_stay_there(
+    seen_s: float, measured_mps: float, kept: list[int]
+) -> None:
+    """A limb of somebody who walks by is judged standing for a moment."""
+    recall, fork = Recall(), box(5.0, 0.0, top_m=0.08, half_across_m=0.04, age_s=seen_s)
+    recall.see(replace(fork, measured_mps=np.array([[0.0, measured_mps]])), 1.0)
+    assert recall.see(None, 1.0 + 1e-3) == kept
+
+
 def test_far_away_it_does_not() -> None:
     recall = Recall()
     recall.see(box(8.0, 0.0), 1.0)
