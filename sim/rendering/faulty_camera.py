@@ -3,36 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 
 from config.faults import Faults
 from hal.clocks import NS_PER_S
+from hal.device_wrapper import DeviceWrapper
 from hal.errors import FrameTimeout
 from hal.types import Intrinsics, RgbdFrame
 from sim.rendering.camera import SimulatedCamera
 
 
-class FaultyCamera:
+class FaultyCamera(DeviceWrapper):
     """A FrameSource. Faults happen before perception gets the frame, as they would in reality.
 
     glass_ids: values of the glass bodies in instance masks.
     """
 
     def __init__(self, camera: SimulatedCamera, faults: Faults, glass_ids: tuple[int, ...]) -> None:
+        super().__init__(camera)
         self._camera, self._faults, self._glass_ids = camera, faults, glass_ids
         self._last: RgbdFrame | None = None
-
-    def __enter__(self) -> Self:
-        self._camera.__enter__()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._camera.__exit__(kind, error, trace)
 
     @property
     def intrinsics(self) -> Intrinsics:

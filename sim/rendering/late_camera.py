@@ -3,35 +3,26 @@
 from __future__ import annotations
 
 from collections import deque
-from types import TracebackType
-from typing import Self
 
 from config.faults import Faults
 from hal.api import Clock
 from hal.clocks import NS_PER_S
+from hal.device_wrapper import DeviceWrapper
 from hal.errors import FrameTimeout
 from hal.types import Intrinsics, RgbdFrame
 from sim.rendering.faulty_camera import FaultyCamera
 
 
-class LateCamera:
+class LateCamera(DeviceWrapper):
     """A FrameSource that holds each frame back for the delay of its scenario. No frame overtakes another.
 
     start_ns: time zero of the world.
     """
 
     def __init__(self, camera: FaultyCamera, faults: Faults, clock: Clock, start_ns: int) -> None:
+        super().__init__(camera)
         self._camera, self._faults, self._clock, self._start_ns = camera, faults, clock, start_ns
         self._held: deque[tuple[int, RgbdFrame]] = deque()
-
-    def __enter__(self) -> Self:
-        self._camera.__enter__()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._camera.__exit__(kind, error, trace)
 
     @property
     def intrinsics(self) -> Intrinsics:

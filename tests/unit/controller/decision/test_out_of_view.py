@@ -7,42 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from controller.decision.bodies import Bodies, no_bodies
+from controller.decision.bodies import no_bodies
 from controller.decision.out_of_view import OutOfView
-from controller.decision.view_edges import ViewEdges
-from hal.types import CameraMount, PlanarPose
+from hal.types import PlanarPose
 from tests.support.floor_bodies import box
-from vision.scene import FreeSpace
-
-MOUNT = CameraMount(0.4, 0.0, 0.60, 0.0)
-EDGE = 0.5
-EDGES = ViewEdges(edge_tan=EDGE, near_m=1.3, up_tan=np.inf)
-FRAME_NS = 100_000_000
-BANDS = np.linspace(-EDGE + 0.025, EDGE - 0.025, 20)
-NOTHING_SEEN = FreeSpace(BANDS, 0.025, np.full(20, np.inf), np.zeros(20))
-ALL_SEEN = FreeSpace(BANDS, 0.025, np.full(20, np.inf), np.full(20, 8.0))
-
-
-class Recall:
-    def __init__(self) -> None:
-        self.memory = OutOfView(MOUNT, 1.5)
-        self.before = no_bodies(0)
-        self.now_ns = 0
-
-    def see(
-        self, bodies: Bodies | None, x_m: float, standing: bool = False, free: FreeSpace = NOTHING_SEEN
-    ) -> list[int]:
-        """One scene from a robot at x_m; returns the ids of what is remembered besides it."""
-        return [int(one) for one in self.recall(bodies, x_m, free, standing).ids]
-
-    def recall(self, bodies: Bodies | None, x_m: float, free: FreeSpace, standing: bool = False) -> Bodies:
-        """The same; returns what is remembered."""
-        self.now_ns += FRAME_NS
-        seen = replace(bodies if bodies is not None else no_bodies(0), captured_ns=self.now_ns)
-        kept = self.memory.update(self.before, seen, PlanarPose(x_m, 0.0, 0.0), EDGES, standing, free)
-        self.before = seen
-        return kept
-
+from tests.support.recall import ALL_SEEN, BANDS, EDGES, FRAME_NS, MOUNT, NOTHING_SEEN, Recall
 
 PALLET = box(5.0, 0.0, top_m=0.15)
 
@@ -64,59 +33,6 @@ def test_what_vanishes_far_away_has_gone() -> None:
     recall = Recall()
     recall.see(PALLET, 1.0)
     assert recall.see(None, 1.1, free=ALL_SEEN) == []
-
-
-def seen_to(nearest_m: float, known_m: float) -> FreeSpace:
-    return FreeSpace(BANDS, 0.025, np.full(20, nearest_m), np.full(20, known_m))
-
-
-@pytest.mark.parametrize(
-    ("free", "kept"),
-    [
-        (NOTHING_SEEN, [1]),
-        (seen_to(1.0, 1.0), [1]),
-        (seen_to(np.inf, 3.5), [1]),
-        (seen_to(3.5, 3.4), []),
-        (seen_to(7.0, 6.9), []),
-        (ALL_SEEN, []),
-    ],
-    ids=[
-        "no depth",
-        "something nearer",
-        "floor in part",
-        "a surface there",
-        "a surface behind",
-        "free floor",
-    ],
-)
-def test_what_is_missed_in_the_middle_of_the_view_stays_until_its_place_is_seen(
-    free: FreeSpace, kept: list[int]
-) -> None:
-    """3.6 m ahead of the camera, as thin as a fork of a pallet jack."""
-    recall = Recall()
-    recall.see(box(5.0, 0.0, top_m=0.08, half_across_m=0.04), 1.0)
-    for _ in range(30):
-        assert recall.see(None, 1.0 + 1e-3, free=free) == kept
-
-
-@pytest.mark.parametrize(
-    ("seen_s", "measured_mps", "kept"),
-    [(1.1, 0.2, [1]), (0.9, 0.2, []), (1.1, 0.4, [])],
-    ids=["stood", "seen for a moment only", "measured as moving"],
-)
-def test_what_did_not_surely_stand_does_not_stay_there(
-    seen_s: float, measured_mps: float, kept: list[int]
-) -> None:
-    """A limb of somebody who walks by is judged standing for a moment."""
-    recall, fork = Recall(), box(5.0, 0.0, top_m=0.08, half_across_m=0.04, age_s=seen_s)
-    recall.see(replace(fork, measured_mps=np.array([[0.0, measured_mps]])), 1.0)
-    assert recall.see(None, 1.0 + 1e-3) == kept
-
-
-def test_far_away_it_does_not() -> None:
-    recall = Recall()
-    recall.see(box(8.0, 0.0), 1.0)
-    assert recall.see(None, 1.1) == []
 
 
 def test_what_vanishes_while_the_robot_stands_has_gone() -> None:
