@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import stat
 import struct
 import zlib
 from pathlib import Path
@@ -65,6 +66,9 @@ def require_size(found_width: int, found_height: int, width: int, height: int) -
 
 def _contents(path: Path) -> bytes:
     try:
+        # Reading a pipe may wait for ever, and a device may never end.
+        if not stat.S_ISREG(path.stat().st_mode):
+            raise ImageError("is not a regular file")
         return path.read_bytes()
     except OSError as error:
         raise ImageError(f"cannot be read ({error.strerror})") from error

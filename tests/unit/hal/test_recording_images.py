@@ -108,6 +108,12 @@ def test_a_missing_an_empty_and_a_foreign_file_are_told_apart(tmp_path: Path) ->
         read_colour(path, WIDTH, HEIGHT)
 
 
+@pytest.mark.parametrize("path", [Path("/dev/null"), Path("/")])
+def test_a_device_a_pipe_and_a_folder_are_never_read(path: Path) -> None:
+    with pytest.raises(ImageError, match="is not a regular file"):
+        read_colour(path, WIDTH, HEIGHT)
+
+
 def test_a_wrong_size_is_told_with_both_sizes(colour: Path) -> None:
     with pytest.raises(ImageError, match=r"is 64x48, its calibration says 640x480"):
         read_colour(colour, 640, 480)
