@@ -257,6 +257,7 @@ def test_stop_on_a_lost_link_raises_nothing(rig: Rig) -> None:
 
 def test_stop_on_a_link_that_has_come_back_is_heard(rig: Rig) -> None:
     """The driver has not tried the link again yet, but stop() does."""
+    rig.require_emulator("its driver does not read again before the base stands anyway")
     rig.run(0.2)
     rig.arm()
     rig.run(1.0, 0.5)
