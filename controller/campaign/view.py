@@ -4,6 +4,7 @@ footprints."""
 from __future__ import annotations
 
 import math
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from config.camera import SimulatedCameraConfig
 from config.robot import Mount
 from hal.compiled import compiled, inlined
 from hal.records import record
-from hal.types import FloatArray, PlanarPose
+from hal.types import FloatArray, Integers, Matrix, PlanarPose, Vector
 from sim.planar import PlanarWorld
 from vision.scene import NEVER_M
 
@@ -20,7 +21,7 @@ IntArray = NDArray[np.intp]
 BoolArray = NDArray[np.bool_]
 
 # x_m and y_m of the camera on the floor, and the cosine and sine of where it looks.
-Eye = tuple[float, float, float, float]
+Eye = Annotated[tuple[float, float, float, float], "UniTuple(float64, 4)"]
 
 BANDS = 80
 _NEAR_M = 0.1
@@ -38,9 +39,9 @@ class PlanarView:
     camera_pose: PlanarCamera.camera_pose().
     """
 
-    bodies: IntArray
-    forward_m: FloatArray
-    free_m: FloatArray
+    bodies: Integers
+    forward_m: Matrix
+    free_m: Vector
     camera_pose: Eye
 
 
@@ -48,8 +49,14 @@ class PlanarCamera:
     """A pinhole camera with its height and pitch.
 
     bearing_tan: (B,), right divided by forward, of the ray of each band.
+    half_width_tan: half the width of a band, in the same unit.
+    range_m: how far it sees.
     floor_from_m, up_tan: as in FreeSpace.
     """
+
+    bearing_tan: Vector
+    half_width_tan: float
+    range_m: float
 
     def __init__(
         self,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from hal.compiled import compiled, inlined
 from hal.geometry import camera_in_body
 from hal.records import record
-from hal.types import CameraMount, FloatArray, PlanarPose
+from hal.types import CameraMount, Flags, FloatArray, Integers, Matrices, Matrix, PlanarPose, Vector
 from vision.scene import Scene
 
 # Nothing in a hall is farther away, larger or faster: such numbers are faults of perception.
@@ -45,21 +45,21 @@ class Bodies:
     """
 
     captured_ns: int
-    ids: NDArray[np.int64]
-    xy_m: FloatArray
-    velocity_mps: FloatArray
-    measured_mps: FloatArray
-    innovation_mps: FloatArray
-    covariance: FloatArray
-    half_view_m: FloatArray
-    half_across_m: FloatArray
-    view_rad: FloatArray
-    top_m: FloatArray
-    bottom_m: FloatArray
-    moving: NDArray[np.bool_]
-    age_s: FloatArray
-    unseen_s: FloatArray
-    tracked_s: FloatArray
+    ids: Integers
+    xy_m: Matrix
+    velocity_mps: Matrix
+    measured_mps: Matrix
+    innovation_mps: Matrix
+    covariance: Matrices
+    half_view_m: Vector
+    half_across_m: Vector
+    view_rad: Vector
+    top_m: Vector
+    bottom_m: Vector
+    moving: Flags
+    age_s: Vector
+    unseen_s: Vector
+    tracked_s: Vector
 
     def __len__(self) -> int:
         return len(self.ids)

@@ -15,7 +15,7 @@ from controller.decision.bodies import Bodies
 from controller.path.path import Path
 from hal.compiled import compiled, inlined
 from hal.records import record
-from hal.types import FloatArray
+from hal.types import FloatArray, Matrix, Vector
 
 _STEP_M = 0.1
 # The path is searched from this far behind the robot.
@@ -63,13 +63,13 @@ class Placed:
     clearance_m: free floor between the body's side and the corridor; negative: inside it.
     """
 
-    s_m: FloatArray
-    d_m: FloatArray
-    heading_rad: FloatArray
-    half_s_m: FloatArray
-    block_from_s_m: FloatArray
-    block_to_s_m: FloatArray
-    clearance_m: FloatArray
+    s_m: Matrix
+    d_m: Matrix
+    heading_rad: Matrix
+    half_s_m: Matrix
+    block_from_s_m: Matrix
+    block_to_s_m: Matrix
+    clearance_m: Matrix
 
 
 def place(bodies: Bodies, corridor: Corridor, times_s: FloatArray, near_s_m: float, reach_m: float) -> Placed:
@@ -156,12 +156,12 @@ class PathVelocities:
     innovation_along_mps, innovation_left_mps: by how much the newest measurement differs from them.
     """
 
-    along_mps: FloatArray
-    left_mps: FloatArray
-    sigma_along_mps: FloatArray
-    sigma_left_mps: FloatArray
-    innovation_along_mps: FloatArray
-    innovation_left_mps: FloatArray
+    along_mps: Vector
+    left_mps: Vector
+    sigma_along_mps: Vector
+    sigma_left_mps: Vector
+    innovation_along_mps: Vector
+    innovation_left_mps: Vector
 
 
 def path_velocities(bodies: Bodies, heading_rad: FloatArray) -> PathVelocities:

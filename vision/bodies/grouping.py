@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.compiled import compiled
-from hal.types import FloatArray
+from hal.types import FloatArray, Matrix, Vector
 from vision.bodies.boxes import LOAD_GAP_M, MIN_SAMPLES, SEEN_THROUGH_GAP_M, cells_between, relations
 from vision.bodies.division import NEARER_INVERSE
 from vision.depth.depth_grid import DepthGrid
@@ -43,10 +43,10 @@ class ExpectedBodies:
     sigma_m: standard deviation of measured depth there, (T,).
     """
 
-    centre_m: FloatArray
-    extent_m: FloatArray
-    box_m: FloatArray
-    sigma_m: FloatArray
+    centre_m: Matrix
+    extent_m: Matrix
+    box_m: Matrix
+    sigma_m: Vector
 
 
 def expected_in(

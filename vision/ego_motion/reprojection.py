@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.compiled import compiled
-from hal.types import FloatArray, Intrinsics
+from hal.types import Flags, FloatArray, Intrinsics, Matrix, Vector
 from vision.camera.lens import row_delays
 
 
@@ -24,11 +24,11 @@ class Anchors:
     usable: (N,).
     """
 
-    points_m: FloatArray
-    range_m: FloatArray
-    depth_sigma_m: FloatArray
-    pixel_cov: FloatArray
-    usable: NDArray[np.bool_]
+    points_m: Matrix
+    range_m: Matrix
+    depth_sigma_m: Vector
+    pixel_cov: Matrix
+    usable: Flags
 
 
 @dataclass(frozen=True, slots=True, eq=False)

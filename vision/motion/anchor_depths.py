@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from config.perception import DepthNoise
 from hal.compiled import compiled
-from hal.types import FloatArray, Pose
+from hal.types import Flags, FloatArray, Pose, Vector
 from vision.depth.depth_mask import UNSEEN_M
 from vision.depth.depth_noise import depth_sigma_of
 from vision.ego_motion.reprojection import Anchors
@@ -44,11 +44,11 @@ class AnchorDepths:
     mixed: the surroundings of the end lie on two surfaces.
     """
 
-    near_m: FloatArray
-    sigma_m: FloatArray
-    far_m: FloatArray
-    known: NDArray[np.bool_]
-    mixed: NDArray[np.bool_]
+    near_m: Vector
+    sigma_m: Vector
+    far_m: Vector
+    known: Flags
+    mixed: Flags
 
 
 def depths_with_sigma(anchor: AnchorEnds, noise: DepthNoise) -> AnchorDepths:

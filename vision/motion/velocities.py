@@ -17,10 +17,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hal.compiled import compiled
-from hal.types import FloatArray
+from hal.types import Flags, FloatArray, Matrix, Vector
 
 STATIC_END_CHI2 = 6.0  # of static_chi2: 95 % of static ends lie below; 2 degrees of freedom
 _MIN_DETERMINANT = 1e-18  # m^4, of a covariance: a lower bound that avoids a division by 0
@@ -44,17 +43,17 @@ class EndResiduals:
     usable: none of the others but depth_step_m is NaN where this is true, (N,).
     """
 
-    static_m: FloatArray
-    ray: FloatArray
-    lag_s: FloatArray
-    residual_m: FloatArray
-    covariance: FloatArray
-    depth_effect: FloatArray
-    depth_step_m: FloatArray
-    depth_step_sigma_m: FloatArray
-    depth_lag_s: FloatArray
-    static_chi2: FloatArray
-    usable: NDArray[np.bool_]
+    static_m: Matrix
+    ray: Matrix
+    lag_s: Vector
+    residual_m: Matrix
+    covariance: Matrix
+    depth_effect: Matrix
+    depth_step_m: Vector
+    depth_step_sigma_m: Vector
+    depth_lag_s: Vector
+    static_chi2: Vector
+    usable: Flags
 
 
 def normal_equations(motion: EndResiduals, weight: FloatArray) -> FloatArray:
