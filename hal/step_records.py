@@ -74,8 +74,10 @@ def _code(function: Function) -> CodeType:
 
 
 def _typed(record: type) -> Iterator[tuple[str, str]]:
-    """The fields of a record that have a compiled type, with it."""
+    """The public fields of a record that have a compiled type, with it."""
     for name, kind in get_type_hints(record, include_extras=True).items():
+        if name.startswith("_"):
+            continue
         if kind in _NUMBERS:
             yield name, _NUMBERS[kind]
         elif hasattr(kind, "__metadata__"):  # Annotated

@@ -10,15 +10,11 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hal.compiled import compiled, inlined
-from hal.types import FloatArray
+from hal.types import Flags, FloatArray, Integers, Matrix
 from vision.depth.connected import MAX_JUMP, MIN_JUMP, IntGrid
 from vision.depth.depth_grid import DepthGrid, FloatGrid
-
-Counts = NDArray[np.intp]
-Flags = NDArray[np.bool_]
 
 _UNIFORM = 3.46  # the length of a uniform distribution in standard deviations: square root of 12
 # A part this close to the floor, in metres and per metre of depth, stands on it: the lowest part of a body is
@@ -45,11 +41,11 @@ class Regions:
     overlapped: something nearer begins at its left or right rim, (R,).
     """
 
-    cells: Counts
-    rows: Counts
-    bbox_px: FloatArray
-    position_m: FloatArray
-    extent_m: FloatArray
+    cells: Integers
+    rows: Integers
+    bbox_px: Matrix
+    position_m: Matrix
+    extent_m: Matrix
     sides_visible: Flags
     top_and_bottom_visible: Flags
     overlapped: Flags
@@ -100,7 +96,7 @@ def measure(grid: DepthGrid, labels: IntGrid, count: int) -> Regions:
 
 
 @inlined
-def _edges(labels: IntGrid, count: int) -> tuple[Counts, Counts]:
+def _edges(labels: IntGrid, count: int) -> tuple[Integers, Integers]:
     """(R,) number of cells of parts 1..count of labels (h, w), and (R, 4) their left, top, right, bottom.
 
     These are columns and rows of the grid; 0, 0, 0, -1 for parts without cells.
@@ -147,7 +143,7 @@ def _foot_px(
 
 @inlined
 def _sums(
-    inverse: FloatGrid, labels: IntGrid, x: FloatGrid, y: FloatGrid, edges: Counts
+    inverse: FloatGrid, labels: IntGrid, x: FloatGrid, y: FloatGrid, edges: Integers
 ) -> tuple[FloatArray, FloatArray]:
     """Sums over each part with edges (R, 4), (R, 4): inverse depth, its square, x, y.
 
@@ -191,7 +187,7 @@ def _measured(
     offset_px: float,
     up: FloatArray,
     height_m: float,
-) -> tuple[Counts, Counts, FloatArray, FloatArray, FloatArray, Flags, Flags]:
+) -> tuple[Integers, Integers, FloatArray, FloatArray, FloatArray, Flags, Flags]:
     """cells and rows (R,), bbox_px (R, 4), position_m and extent_m (R, 3), sides_visible and
     top_and_bottom_visible (R,) of the parts.
 
@@ -242,7 +238,9 @@ def with_occlusion(grid: DepthGrid, labels: IntGrid, regions: Regions) -> Region
 
 
 @compiled("float32[:, ::1], int32[:, ::1], int64, float32")
-def _hidden_cells(inverse: FloatGrid, labels: IntGrid, count: int, jump: np.float32) -> tuple[Counts, Counts]:
+def _hidden_cells(
+    inverse: FloatGrid, labels: IntGrid, count: int, jump: np.float32
+) -> tuple[Integers, Integers]:
     """Two counts of rim cells of each part, (count,) each.
 
     The first: cells at the left or right rim beside which there is something nearer, or another part at the

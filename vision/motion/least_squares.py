@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.compiled import compiled, inlined
-from hal.types import FloatArray
+from hal.types import FloatArray, Matrices, Matrix
 from vision.motion.velocities import EndResiduals, normal_equations
 
 _ROBUST_CHI2 = 9.0  # 99 % of ends that move with the body, 2 degrees of freedom; others lose their weight
@@ -52,9 +52,9 @@ class FragmentVelocities:
     not usable. velocity_mps (N, 3): over ground. covariance (N, 3, 3).
     """
 
-    per_end: FloatArray
-    velocity_mps: FloatArray
-    covariance: FloatArray
+    per_end: Matrix
+    velocity_mps: Matrix
+    covariance: Matrices
 
 
 def fragment_velocities(motion: EndResiduals, max_speed_mps: float) -> FragmentVelocities:
