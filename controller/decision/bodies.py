@@ -109,9 +109,7 @@ class Bodies:
 
     def covers(self, points_m: FloatArray, reach_m: FloatArray, side_m: float) -> NDArray[np.bool_]:
         """(P, N) which floor points (P, 2) lie on which body; reach_m (P,) along the view, side_m across."""
-        return _covers(
-            points_m, reach_m, side_m, self.xy_m, self.view_rad, self.half_view_m, self.half_across_m
-        )
+        return _covers(self, points_m, reach_m, side_m)
 
 
 _arrays_of = attrgetter(*(name for name in Bodies.__slots__ if name != "captured_ns"))
@@ -208,25 +206,17 @@ def _complaint(track_id: int, measured: FloatArray) -> str:
     return f"obstacle {track_id} is impossible: {what}"
 
 
-@compiled("float64[:, :], float64[:], float64, float64[:, :], float64[:], float64[:], float64[:]")
-def _covers(
-    points_m: FloatArray,
-    reach_m: FloatArray,
-    side_m: float,
-    xy_m: FloatArray,
-    view_rad: FloatArray,
-    half_view_m: FloatArray,
-    half_across_m: FloatArray,
-) -> NDArray[np.bool_]:
-    covered = np.empty((len(points_m), len(xy_m)), np.bool_)
-    for k in range(len(xy_m)):
-        cos, sin = math.cos(view_rad[k]), math.sin(view_rad[k])
+@compiled(Bodies, "float64[:, :], float64[:], float64")
+def _covers(bodies: Bodies, points_m: FloatArray, reach_m: FloatArray, side_m: float) -> NDArray[np.bool_]:
+    """As Bodies.covers."""
+    covered = np.empty((len(points_m), len(bodies.xy_m)), np.bool_)
+    for k in range(len(bodies.xy_m)):
+        cos, sin = math.cos(bodies.view_rad[k]), math.sin(bodies.view_rad[k])
+        half_view_m, half_across_m = bodies.half_view_m[k], bodies.half_across_m[k] + side_m
         for i in range(len(points_m)):
-            dx, dy = points_m[i, 0] - xy_m[k, 0], points_m[i, 1] - xy_m[k, 1]
-            covered[i, k] = (
-                abs(dx * cos + dy * sin) <= half_view_m[k] + reach_m[i]
-                and abs(dy * cos - dx * sin) <= half_across_m[k] + side_m
-            )
+            dx, dy = points_m[i, 0] - bodies.xy_m[k, 0], points_m[i, 1] - bodies.xy_m[k, 1]
+            along_m, across_m = abs(dx * cos + dy * sin), abs(dy * cos - dx * sin)
+            covered[i, k] = along_m <= half_view_m + reach_m[i] and across_m <= half_across_m
     return covered
 
 
