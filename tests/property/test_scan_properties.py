@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from config.robot import Robot
-from controller.decision.bodies import SceneError
+from controller.decision.situation import SceneError
 from controller.decision.surfaces import check_scan
 from controller.shape import SpeedShaper
 from hal.types import FloatArray

@@ -178,7 +178,7 @@ class Tracks:
         if elapsed_s <= 0.0:
             return np.zeros(len(self), np.bool_)
         asked = self.moving & (self.unproven_s >= _UNPROVEN_S)
-        return _must_have_left(asked, self.state, self.extent_m, sight, resolves_m, elapsed_s)
+        return _must_have_left(self, asked, sight, resolves_m, elapsed_s)
 
     def update_durations(self, proven: NDArray[np.bool_], dt_s: float) -> None:
         """Update the durations after a verdict, dt_s after the last. proven (T,): motion, by this frame."""
@@ -279,25 +279,20 @@ def _sight(state: FloatArray, camera_m: FloatArray) -> tuple[FloatArray, FloatAr
     return sight, distance_m
 
 
-@compiled("boolean[::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], float64")
+@compiled(Tracks, "boolean[::1], float64[:, ::1], float64[::1], float64")
 def _must_have_left(
-    asked: NDArray[np.bool_],
-    state: FloatArray,
-    extent_m: FloatArray,
-    sight: FloatArray,
-    resolves_m: FloatArray,
-    elapsed_s: float,
+    tracks: Tracks, asked: NDArray[np.bool_], sight: FloatArray, resolves_m: FloatArray, elapsed_s: float
 ) -> NDArray[np.bool_]:
     """(T,) of the tracks asked (T,), those that must have left their place of elapsed_s ago."""
     gone = np.zeros(len(asked), np.bool_)
     for t in range(len(asked)):
         along_m, squared = 0.0, 0.0
         for i in range(3):
-            displacement_m = elapsed_s * state[t, 3 + i]
+            displacement_m = elapsed_s * tracks.state[t, 3 + i]
             along_m += displacement_m * sight[t, i]
             squared += displacement_m * displacement_m
         across_m = math.sqrt(max(squared - along_m * along_m, 0.0))
-        width_m, depth_m = max(extent_m[t, 0], extent_m[t, 2]), extent_m[t, 2]
+        width_m, depth_m = max(tracks.extent_m[t, 0], tracks.extent_m[t, 2]), tracks.extent_m[t, 2]
         far = across_m >= _LEFT_SHARE * width_m or abs(along_m) >= max(resolves_m[t], _LEFT_SHARE * depth_m)
         gone[t] = asked[t] and far
     return gone

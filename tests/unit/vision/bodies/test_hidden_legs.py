@@ -11,7 +11,8 @@ from hal.types import FloatArray, PlanarPose
 from tests.support.painted import QVGA, Quad, box, drive, record, vector
 from tests.support.painted_room import SIDEWAYS, TOWARDS, look, room
 from tests.unit.vision.depth.test_regions import SHAPE, flat, grid_of
-from vision.depth.regions import hidden_below, measure
+from vision.depth.occlusion import hidden_below
+from vision.depth.regions import measure
 from vision.scene import Obstacle
 
 SCREEN = box(vector(2.0, 0.0, 0.0), vector(0.3, 2.6, 0.9), 20)  # as high as the robot

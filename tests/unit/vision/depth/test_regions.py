@@ -12,7 +12,8 @@ from vision.bodies.ends import near_ends
 from vision.bodies.masks import predict, surfaces
 from vision.depth.connected import components, spread_labels
 from vision.depth.depth_grid import DepthGrid
-from vision.depth.regions import measure, with_occlusion
+from vision.depth.occlusion import with_occlusion
+from vision.depth.regions import measure
 
 IDENTITY = Pose(np.eye(3), np.zeros(3))
 SHAPE = (24, 32)
