@@ -88,7 +88,7 @@ distances = st.floats(0.0, 100.0)
     st.floats(0.0, NEVER_M),
     st.floats(-2.0, 2.0) | st.just(math.inf),
 )
-def test_what_a_camera_may_tell_is_not_refused(
+def test_possible_scan_is_not_refused(
     bands: list[tuple[float, float]],
     half_width_tan: float,
     first_tan: float,

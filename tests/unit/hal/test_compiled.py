@@ -144,7 +144,7 @@ def run_step(folder: Path, most_bytes: int | None = None, text: str = STEP) -> t
     return done.returncode, done.stdout, done.stderr
 
 
-def test_what_is_kept_is_made_anew_when_what_a_step_rests_on_changes(tmp_path: Path) -> None:
+def test_cached_step_is_rebuilt_when_a_part_or_constant_changes(tmp_path: Path) -> None:
     """A part, called by way of another one, and a constant, both of another file."""
 
     def told_with(times: float, plus: float) -> tuple[str, str]:
@@ -162,9 +162,7 @@ def test_what_is_kept_is_made_anew_when_what_a_step_rests_on_changes(tmp_path: P
 
 @pytest.mark.parametrize("left_bytes", [0, 20])
 @pytest.mark.parametrize("ending", ["nbi", "nbc"])
-def test_what_is_kept_is_read_again_and_made_anew_where_it_is_damaged(
-    tmp_path: Path, ending: str, left_bytes: int
-) -> None:
+def test_cache_is_read_again_and_rebuilt_if_damaged(tmp_path: Path, ending: str, left_bytes: int) -> None:
     code, answer, told = run_step(tmp_path)
     assert (code, answer) == (0, "3.0\n")
     assert "compiling for this processor" in told

@@ -59,7 +59,7 @@ def test_a_box_stands_where_it_was_seen() -> None:
     assert bodies.captured_ns == 5
 
 
-def test_what_stands_has_no_velocity() -> None:
+def test_standing_obstacle_has_no_velocity() -> None:
     bodies = bodies_of(scene(seen(velocity_mps=(0.1, 0.1, 0.0))), POSE, MOUNT, depth_m=0.5)
     assert bodies.velocity_mps.tolist() == [[0.0, 0.0]]
 

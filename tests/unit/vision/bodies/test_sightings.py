@@ -37,11 +37,11 @@ def test_a_mover_of_which_less_than_two_fifths_are_left_to_see_is_a_sliver(
     assert (abs(whole_m - 0.6) < 0.1) == nearly_hidden  # a small rest says nothing of how wide its body is
 
 
-def test_what_stands_is_no_sliver() -> None:
+def test_standing_track_is_not_nearly_hidden() -> None:
     assert not seen_of(-0.3, -0.2, moving=False).nearly_hidden.any()
 
 
-def test_who_leaves_the_image_is_no_sliver() -> None:
+def test_mover_that_leaves_the_image_is_not_nearly_hidden() -> None:
     """Its rest is where it is seen to be, and the others are outside."""
     assert not seen_of(-1.6, -1.5).nearly_hidden.any()
 
