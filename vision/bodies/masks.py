@@ -18,6 +18,7 @@ from hal.compiled import compiled
 from hal.types import FloatArray, Pose
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import DepthGrid, FloatGrid
+from vision.numerics.pose_axes import inner_vector
 from vision.numerics.relative_pose import NEAREST_M, coordinate_m, relative_row
 
 # The gate on depth is the sum of both: as large as a jump in depth within one part may be (in 1/m), and how
@@ -99,16 +100,12 @@ def _predicted(
     result, nearest = np.zeros((height, width), np.int32), np.zeros((height, width), np.float32)
     left, top = grid.x[0], grid.y[0]
     per_column, per_row = np.float32(1.0) / (grid.x[1] - left), np.float32(1.0) / (grid.y[1] - top)
-    to_x, to_y = relative_row(pose, old_pose, 0), relative_row(pose, old_pose, 1)
-    to_z, rotation = relative_row(pose, old_pose, 2), pose.rotation
+    to_x = relative_row(pose, old_pose, 0)
+    to_y = relative_row(pose, old_pose, 1)
+    to_z = relative_row(pose, old_pose, 2)
     displacement_m = np.zeros(shift_m.shape, np.float32)  # in the camera's axes now
     for track in range(len(shift_m)):
-        for i in range(3):
-            displacement_m[track, i] = (
-                shift_m[track, 0] * rotation[0, i]
-                + shift_m[track, 1] * rotation[1, i]
-                + shift_m[track, 2] * rotation[2, i]
-            )
+        displacement_m[track] = inner_vector(pose, shift_m[track])
     for k in range(len(before.owner)):
         track = index[before.owner[k]]
         if track < 0:

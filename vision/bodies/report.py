@@ -11,9 +11,11 @@ from hal.compiled import compiled, inlined
 from hal.types import FloatArray, Intrinsics, Pose
 from vision.bodies.boxes import overlaps
 from vision.bodies.tracks import Tracks
+from vision.camera.lens import pixel_of, ray_through
 from vision.detection import Detection
 from vision.motion.least_squares import FragmentVelocities
 from vision.motion.velocities import EndResiduals
+from vision.numerics.pose_axes import inner_point, inner_vector
 from vision.scene import Fragments, Obstacle
 
 MIN_SIGHTINGS = 3  # frames: a track seen in one or two is taken for a speckle
@@ -67,12 +69,11 @@ def _in_camera(tracks: Tracks, pose: Pose) -> tuple[FloatArray, FloatArray, Floa
     """Position (T, 3), velocity (T, 3) and its covariance (T, 3, 3) in the axes of the camera at pose."""
     state, covariance, rotation = tracks.state, tracks.covariance, pose.rotation
     count = len(state)
-    local, velocity, spread = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 3, 3))
+    local, velocity, spread = np.empty((count, 3)), np.empty((count, 3)), np.zeros((count, 3, 3))
     for t in range(count):
+        local[t] = inner_point(pose, state[t, :3])
+        velocity[t] = inner_vector(pose, state[t, 3:])
         for i in range(3):
-            for k in range(3):
-                local[t, i] += rotation[k, i] * (state[t, k] - pose.translation_m[k])
-                velocity[t, i] += rotation[k, i] * state[t, 3 + k]
             for j in range(3):
                 for k in range(3):
                     for m in range(3):
@@ -95,8 +96,8 @@ def _expected_box(
 ) -> tuple[float, float, float, float]:
     """Left, upper, right, lower edge in the image of the whole body of track t with its centre at x, y, z."""
     left_m, upper_m, right_m, lower_m = tracks.box_m[t]
-    left, right = (x + left_m) / z * camera.fx + camera.cx, (x + right_m) / z * camera.fx + camera.cx
-    upper, lower = (y + upper_m) / z * camera.fy + camera.cy, (y + lower_m) / z * camera.fy + camera.cy
+    left, upper = pixel_of(camera, x + left_m, y + upper_m, z)
+    right, lower = pixel_of(camera, x + right_m, y + lower_m, z)
     return (
         min(max(left, 0.0), camera.width),
         min(max(upper, 0.0), camera.height),
@@ -127,7 +128,7 @@ def _listed(
         listed[t] = listed[t] and (not tracks.overhead[t] or legs)
         unseen = unseen_s[t] != 0.0
         if unseen:
-            u, v = x / z * camera.fx + camera.cx, y / z * camera.fy + camera.cy
+            u, v = pixel_of(camera, x, y, z)
             listed[t] = listed[t] and 0.0 <= u < camera.width and 0.0 <= v < camera.height
         # The box of a mover that is hidden, or nearly hidden, is that of the whole body at its
         # predicted position, not that of the visible rest.
@@ -198,9 +199,8 @@ def _of_fragments(
         depth[k] = np.float32(0.5) * (near_m[k, 0] + near_m[k, 1])
         u = np.float32(0.5) * (ends_px[k, 0, 0] + ends_px[k, 1, 0])
         v = np.float32(0.5) * (ends_px[k, 0, 1] + ends_px[k, 1, 1])
-        position[k, 0] = (u - camera.cx) / camera.fx * depth[k]
-        position[k, 1] = (v - camera.cy) / camera.fy * depth[k]
-        position[k, 2] = depth[k]
+        x, y = ray_through(camera, u, v)
+        position[k, 0], position[k, 1], position[k, 2] = x * depth[k], y * depth[k], depth[k]
         if motion.usable[2 * k] or motion.usable[2 * k + 1]:
             for i in range(3):
                 velocity[k, i] = velocities.velocity_mps[k, i]

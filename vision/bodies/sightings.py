@@ -25,10 +25,12 @@ from hal.compiled import compiled
 from hal.types import FloatArray, Intrinsics, Pose
 from vision.bodies.grouping import ExpectedBodies
 from vision.bodies.tracks import Tracks
+from vision.camera.lens import ray_through
 from vision.depth.connected import MIN_PART_CELLS
 from vision.depth.depth_noise import depth_sigma_of
 from vision.depth.regions import Regions
 from vision.detection import Detection
+from vision.numerics.pose_axes import inner_point, outer_point
 
 # Standard deviation of the centroid of a very small surface: the width of a cell 2.3 m away.
 _CENTRE_SIGMA_M = 0.015
@@ -105,11 +107,8 @@ def _kinds(
         if tracks.sightings[t] == 0:
             usual_m2[t] = now_m2
         change[t] = abs(now_m2 - usual_m2[t]) / usual_m2[t]
-        squared = 0.0
+        centre_m[t], squared = outer_point(pose, measured.position_m[t]), 0.0
         for i in range(3):
-            centre_m[t, i] = pose.translation_m[i]
-            for k in range(3):
-                centre_m[t, i] += pose.rotation[i, k] * measured.position_m[t, k]
             squared += (centre_m[t, i] - tracks.state[t, i]) ** 2
         expected_m = _JUMP_M + 2.0 * depth_sigma_of(depth_m, noise.floor_m, noise.quadratic_per_m)
         # Without a known motion of the camera, its error would be taken for a motion of the tracks.
@@ -167,14 +166,9 @@ def _boxes_m(
         if box_is_whole[t]:
             u0, v0, u1, v1 = measured.bbox_px[t]
             x, y, z = measured.position_m[t]
-            result[t, 0], result[t, 2] = (
-                (u0 - camera.cx) / camera.fx * z - x,
-                (u1 - camera.cx) / camera.fx * z - x,
-            )
-            result[t, 1], result[t, 3] = (
-                (v0 - camera.cy) / camera.fy * z - y,
-                (v1 - camera.cy) / camera.fy * z - y,
-            )
+            left, upper = ray_through(camera, u0, v0)
+            right, lower = ray_through(camera, u1, v1)
+            result[t] = left * z - x, upper * z - y, right * z - x, lower * z - y
     return result
 
 
@@ -188,11 +182,9 @@ def expected_bodies(tracks: Tracks, pose: Pose, noise: DepthNoise) -> ExpectedBo
 def _expected(tracks: Tracks, pose: Pose, noise: DepthNoise) -> tuple[FloatArray, FloatArray]:
     """centre_m and sigma_m of ExpectedBodies."""
     count = len(tracks.state)
-    centre_m, sigma_m = np.zeros((count, 3)), np.empty(count)
+    centre_m, sigma_m = np.empty((count, 3)), np.empty(count)
     for t in range(count):
-        for i in range(3):
-            for k in range(3):
-                centre_m[t, i] += pose.rotation[k, i] * (tracks.state[t, k] - pose.translation_m[k])
+        centre_m[t] = inner_point(pose, tracks.state[t, :3])
         depth_m = max(centre_m[t, 2], 0.0)
         sigma_m[t] = depth_sigma_of(depth_m, noise.floor_m, noise.quadratic_per_m)
     return centre_m, sigma_m

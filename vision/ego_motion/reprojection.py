@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from hal.compiled import compiled
 from hal.types import Flags, FloatArray, Intrinsics, Matrix, Vector
-from vision.camera.lens import row_delays
+from vision.camera.lens import ray_through, row_delays
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,8 +66,7 @@ def _view(
         one = use[k]
         for i in range(3):
             lines[k, 0, i], lines[k, 1, i] = anchors.points_m[one, i], anchors.range_m[one, i]
-        seen[k, 0] = (pixels[one, 0] - camera.cx) / camera.fx
-        seen[k, 1] = (pixels[one, 1] - camera.cy) / camera.fy
+        seen[k, 0], seen[k, 1] = ray_through(camera, pixels[one, 0], pixels[one, 1])
         seen[k, 2] = delays[one]
         # The inverse of the Cholesky factor.
         uu, uv, vv = anchors.pixel_cov[one]

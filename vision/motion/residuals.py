@@ -25,6 +25,7 @@ from vision.fragments.store import AnchorEnds, FragmentStore
 from vision.motion.anchor_depths import AnchorDepths, depth_steps
 from vision.motion.velocities import STATIC_END_CHI2, EndResiduals
 from vision.numerics.order import quantile
+from vision.numerics.pose_axes import inner_point, inner_vector
 
 _SETTLED_FRAMES = 3  # the residuals of younger ends are hardly larger than their noise
 _MIN_ENDS = 16  # minimum for a scale: it is taken from the lower third
@@ -130,24 +131,6 @@ def _sliding_covariance(
     return slide * du * du + rest, slide * du * dv, slide * dv * dv + rest
 
 
-@inlined
-def _camera_axes(
-    pose: Pose, direction: FloatArray, origin: FloatArray
-) -> tuple[float, float, float, float, float, float]:
-    """A direction (3,) and an origin (3,) of the fixed frame in the axes of the camera with this pose."""
-    rotation = pose.rotation
-    dx, dy, dz, x, y, z = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for i in range(3):
-        along, away = direction[i], origin[i] - pose.translation_m[i]
-        dx += rotation[i, 0] * along
-        dy += rotation[i, 1] * along
-        dz += rotation[i, 2] * along
-        x += rotation[i, 0] * away
-        y += rotation[i, 1] * away
-        z += rotation[i, 2] * away
-    return dx, dy, dz, x, y, z
-
-
 @compiled(
     AnchorEnds,
     AnchorDepths,
@@ -182,7 +165,8 @@ def _residuals(
     covariance, effect, chi2 = np.empty((count, 3)), np.empty((count, 2)), np.empty(count)
     usable, noise_scale = np.empty(count, np.bool_), math.sqrt(variance_scale)
     for k in range(count):
-        dx, dy, dz, x0, y0, z0 = _camera_axes(pose, anchor.direction[:, k], anchor.origin[:, k])
+        dx, dy, dz = inner_vector(pose, anchor.direction[:, k])
+        x0, y0, z0 = inner_point(pose, anchor.origin[:, k])
         u, v = straight[k, 0], straight[k, 1]
         near_m, far_m = depths.near_m[k], depths.far_m[k]
         # Where a static end would be now if it is on the near surface, and if it is on the far one.
