@@ -19,9 +19,8 @@ from types import CodeType
 from typing import Any, get_type_hints
 
 Function = Callable[..., Any]
-Fields = Mapping[
-    str, Sequence[str]
-]  # the fields that a step reads, for each of its parameters that is a record
+# The fields that a step reads, for each of its parameters that is a record.
+Fields = Mapping[str, Sequence[str]]
 
 _NUMBERS = {float: "float64", int: "int64", bool: "boolean"}
 
@@ -87,9 +86,9 @@ def _typed(record: type) -> Iterator[tuple[str, str]]:
 def _read(code: CodeType, parameter: str) -> Iterator[str | None]:
     """The fields that code reads of a parameter; None where it hands on the parameter as a whole."""
     for load, following in pairwise(dis.get_instructions(code)):
-        # From Python 3.13 on, one instruction may load two variables.
+        # From Python 3.13 on, one instruction may load two variables, or store one and load the next.
         loaded = load.argval if isinstance(load.argval, tuple) else (load.argval,)
-        if load.opname.startswith("LOAD_FAST") and parameter in loaded:
+        if "LOAD_FAST" in load.opname and parameter in loaded:
             is_read = following.opname == "LOAD_ATTR" and loaded[-1] == parameter
             yield following.argval if is_read else None
 

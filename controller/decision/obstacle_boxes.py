@@ -14,7 +14,7 @@ from controller.decision.bodies import Bodies, no_bodies
 from controller.decision.situation import SceneError
 from hal.compiled import compiled, inlined
 from hal.geometry import camera_in_body
-from hal.types import CameraMount, FloatArray, PlanarPose
+from hal.types import CameraMount, FloatArray, PlanarPose, Pose
 from vision.scene import Scene
 
 # Nothing in a hall is farther away, larger or faster: such numbers are faults of perception.
@@ -47,18 +47,8 @@ def bodies_of(scene: Scene, pose: PlanarPose, mount: CameraMount, depth_m: float
     ).reshape(-1, len(_MAX))
     said = np.array([(one.age_s, one.unseen_s, one.moving) for one in scene.obstacles], np.float64)
     age_s, unseen_s, moving = said[:, 0], said[:, 1], said[:, 2] > 0.0
-    camera = camera_in_body(mount)
     impossible, on_floor, covariance, sizes = _boxes(
-        measured,
-        age_s,
-        unseen_s,
-        moving,
-        depth_m,
-        camera.rotation,
-        camera.translation_m,
-        pose.x_m,
-        pose.y_m,
-        pose.heading_rad,
+        measured, age_s, unseen_s, moving, depth_m, camera_in_body(mount), pose
     )
     if impossible >= 0:
         raise SceneError(_complaint(scene.obstacles[impossible].id, measured[impossible]))
@@ -99,38 +89,33 @@ def _dot(one: FloatArray, other: FloatArray) -> float:
     return float(one[0] * other[0] + one[1] * other[1] + one[2] * other[2])
 
 
-@compiled(
-    "float64[:, ::1], float64[:], float64[:], boolean[::1], float64, float64[:, :], float64[:],"
-    "float64, float64, float64"
-)
+@compiled("float64[:, ::1], float64[:], float64[:], boolean[::1], float64", Pose, PlanarPose)
 def _boxes(
     measured: FloatArray,
     age_s: FloatArray,
     unseen_s: FloatArray,
     moving: NDArray[np.bool_],
     depth_m: float,
-    in_body: FloatArray,
-    in_body_m: FloatArray,
-    x_m: float,
-    y_m: float,
-    heading_rad: float,
+    camera: Pose,
+    robot: PlanarPose,
 ) -> tuple[int, FloatArray, FloatArray, FloatArray]:
     """Index of the first impossible one of N obstacles (-1: none), and fields of Bodies.
 
     These are (4, N, 2) xy_m, measured_mps, velocity_mps, innovation_mps; the covariance; (5, N) half_view_m,
-    half_across_m, view_rad, top_m, bottom_m. in_body (3, 3), in_body_m (3,): pose of the camera in the robot.
+    half_across_m, view_rad, top_m, bottom_m. camera: its pose in the robot.
     """
     count, impossible = len(measured), -1
     on_floor, covariance, sizes = np.zeros((4, count, 2)), np.empty((count, 2, 2)), np.empty((5, count))
     xy, measured_mps, velocity, _ = on_floor
     half_view, half_across, view_rad, top, bottom = sizes
-    view_rad[:] = heading_rad
-    cos, sin, turn = math.cos(heading_rad), math.sin(heading_rad), np.empty((2, 3))
+    view_rad[:] = robot.heading_rad
+    cos, sin, turn = math.cos(robot.heading_rad), math.sin(robot.heading_rad), np.empty((2, 3))
+    in_body, in_body_m = camera.rotation, camera.translation_m
     for j in range(3):
         turn[0, j] = cos * in_body[0, j] - sin * in_body[1, j]
         turn[1, j] = sin * in_body[0, j] + cos * in_body[1, j]
-    from_x = x_m + cos * in_body_m[0] - sin * in_body_m[1]
-    from_y = y_m + sin * in_body_m[0] + cos * in_body_m[1]
+    from_x = robot.x_m + cos * in_body_m[0] - sin * in_body_m[1]
+    from_y = robot.y_m + sin * in_body_m[0] + cos * in_body_m[1]
     for k in range(count):
         one = measured[k]
         # Written so that NaN fails every comparison.
