@@ -92,10 +92,13 @@ def _position_known(unseen_s: float, cells: int, moving: bool, nearly_hidden: bo
 
 @inlined
 def _expected_box(
-    tracks: Tracks, t: int, x: float, y: float, z: float, camera: Intrinsics
+    box_m: FloatArray, x: float, y: float, z: float, camera: Intrinsics
 ) -> tuple[float, float, float, float]:
-    """Left, upper, right, lower edge in the image of the whole body of track t with its centre at x, y, z."""
-    left_m, upper_m, right_m, lower_m = tracks.box_m[t]
+    """Left, upper, right, lower edge in the image of a whole body with its centre at x, y, z.
+
+    box_m (4,): as in Tracks.
+    """
+    left_m, upper_m, right_m, lower_m = box_m
     left, upper = pixel_of(camera, x + left_m, y + upper_m, z)
     right, lower = pixel_of(camera, x + right_m, y + lower_m, z)
     return (
@@ -133,7 +136,7 @@ def _listed(
         # The box of a mover that is hidden, or nearly hidden, is that of the whole body at its
         # predicted position, not that of the visible rest.
         if moving and (unseen or nearly_hidden):
-            bbox[t] = _expected_box(tracks, t, x, y, z, camera)
+            bbox[t] = _expected_box(tracks.box_m[t], x, y, z, camera)
             if not unseen:
                 seen = tracks.bbox_px[t]
                 bbox[t, 0], bbox[t, 1] = min(bbox[t, 0], seen[0]), min(bbox[t, 1], seen[1])
