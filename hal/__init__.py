@@ -7,6 +7,7 @@ records.py - dataclasses that are quick to make
 clocks.py - the monotonic clock, and a simulated one
 geometry.py - transforms between floor, body and camera
 compiled.py - compilation of loops with Numba
+step_records.py - records as arguments of compiled loops
 device_wrapper.py - base class of wrappers that open and close what they wrap
 links/ - CAN, serial and datagram links
 chassis/ - chassis drivers

@@ -8,9 +8,14 @@ that folder is not writable. The first import compiles all steps, which takes a 
 message; later imports take a moment. A cache that cannot be read is rebuilt. If nothing can be cached, every
 start compiles and prints a message.
 
-Rules: a step takes numbers and arrays, does not change them, and returns new ones; inlined parts may write to
-the arrays they are given. Indices are not checked, so they must be in range. With NUMBA_DISABLE_JIT=1 all
-steps run as plain Python, for a debugger; there 1.0 / 0.0 is an error.
+Rules: a step takes numbers, arrays and records, does not change them, and returns new ones; inlined parts
+may write to the arrays they are given. Indices are not checked, so they must be in range. With
+NUMBA_DISABLE_JIT=1 all steps run as plain Python, for a debugger; there 1.0 / 0.0 is an error.
+
+A record is an object whose class declares its fields, such as a dataclass or a section of the settings. Array
+fields are declared with the types of hal/types.py (Vector, Matrix, Flags), which tell the compiler their
+dimensions. A step reads the fields of a record by name, or hands the record on to inlined parts. A call takes
+0.08 us for each array that the step reads, as if it were an argument of its own (hal/step_records.py).
 
 A cached step is rebuilt when its file changes, when the file of a part it calls changes, or when the value of
 a constant it reads changes, in whichever module these are (_rests_on). Numba alone would check only the
@@ -21,7 +26,7 @@ from __future__ import annotations
 
 import inspect
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from hashlib import sha256
 from pathlib import Path
 from pickle import PickleError
@@ -33,6 +38,8 @@ from numba import njit, types
 from numba.core import caching, sigutils
 from numba.core.dispatcher import Dispatcher
 from numba.core.errors import NumbaError
+
+from hal.step_records import fields_read, from_fields, from_records, parameters_of
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -58,29 +65,55 @@ _NOT_KEPT = (
 )
 
 
-def compiled(arguments: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Decorator that compiles a step for these argument types, in Numba's notation.
+def compiled(*arguments: str | type) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Decorator that compiles a step for these arguments: types in Numba's notation, or classes of records.
 
-    Example: "float32[:, ::1], int64". [::1] is contiguous, [:] need not be. Read-only arrays are accepted.
-    Division by zero gives inf or NaN, as in NumPy.
+    Example: @compiled(Bodies, ViewEdges, "float64[:, ::1], int64"). [::1] is contiguous, [:] need not be.
+    Read-only arrays are accepted. Division by zero gives inf or NaN, as in NumPy.
     """
-    parsed, _ = sigutils.normalize_signature(f"({arguments},)")
-    signature = tuple(_read_only(argument) for argument in parsed)
 
-    def build(function: Callable[P, R]) -> Callable[P, R]:
-        why = ""
-        # The second attempt replaces a damaged cache, for example where power was cut while it was written.
-        for anew in (False, True):
-            try:
-                return _build(function, signature, kept=True, anew=anew)
-            except NumbaError:
-                raise  # an error in the step itself
-            except _NOT_KEPT as error:
-                why = str(error).partition("\n")[0]
-        _say(_EVERY_TIME, why)
-        return _build(function, signature, kept=False)
+    def decorate(function: Callable[P, R]) -> Callable[P, R]:
+        signature: list[types.Type] = []
+        fields: dict[str, tuple[str, ...]] = {}
+        for name, kind in zip(parameters_of(function), _one_by_one(arguments), strict=True):
+            if isinstance(kind, type):
+                read = fields_read(function, name, kind)
+                fields[name] = tuple(read)
+                signature += _one_by_one(read.values())
+            else:
+                signature.append(kind)
+        if not fields:
+            return _compile(function, tuple(signature))
+        flat = _compile(from_fields(inlined(function), function, fields), tuple(signature))
+        result: Callable[P, R] = from_records(flat, function, fields)
+        return result
 
-    return build
+    return decorate
+
+
+def _one_by_one(arguments: Iterable[str | type]) -> Iterator[Any]:
+    """The classes among arguments as they are, and each type that the others name, for arrays to be read."""
+    for argument in arguments:
+        if isinstance(argument, str):
+            parsed, _ = sigutils.normalize_signature(f"({argument},)")
+            yield from map(_read_only, parsed)
+        else:
+            yield argument
+
+
+def _compile(function: Callable[P, R], signature: tuple[types.Type, ...]) -> Callable[P, R]:
+    """function compiled for signature, from the cache if that can be read."""
+    why = ""
+    # The second attempt replaces a damaged cache, for example where power was cut while it was written.
+    for anew in (False, True):
+        try:
+            return _build(function, signature, kept=True, anew=anew)
+        except NumbaError:
+            raise  # an error in the step itself
+        except _NOT_KEPT as error:
+            why = str(error).partition("\n")[0]
+    _say(_EVERY_TIME, why)
+    return _build(function, signature, kept=False)
 
 
 def inlined(function: Callable[P, R]) -> Callable[P, R]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,14 @@ from numpy.typing import NDArray
 from hal.records import record
 
 FloatArray = NDArray[np.float64]
+# Arrays of known dimensions. The note is their type for compiled steps that read them from a record
+# (hal/compiled.py); for the type checker they are arrays like all others.
+Vector = Annotated[FloatArray, "float64[:]"]
+Matrix = Annotated[FloatArray, "float64[:, :]"]
+Matrices = Annotated[FloatArray, "float64[:, :, :]"]
+FlagMatrix = Annotated[NDArray[np.bool_], "boolean[:, :]"]
+Flags = Annotated[NDArray[np.bool_], "boolean[:]"]
+Integers = Annotated[NDArray[np.intp], "int64[:]"]
 ColourImage = NDArray[np.uint8]
 DepthImage = NDArray[np.uint16]
 # Sender of a datagram as the socket module gives it: (host, port, ...), or the path of a Unix socket.
@@ -78,8 +86,8 @@ class Pose:
     rotation: (3, 3); translation_m: (3,).
     """
 
-    rotation: FloatArray
-    translation_m: FloatArray
+    rotation: Matrix
+    translation_m: Vector
 
     def inverse(self) -> Pose:
         """The pose of the outer frame in the inner one."""

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.records import record
-from hal.types import FloatArray, PlanarPose, Pose
+from hal.types import FloatArray, PlanarPose, Pose, Vector
 
 
 @record(frozen=True, slots=True, eq=False)
@@ -70,10 +70,10 @@ class FreeSpace:
     blank: (N,) bands in which hardly anything was measured at all, near or far; None: not reported.
     """
 
-    bearing_tan: FloatArray
+    bearing_tan: Vector
     half_width_tan: float
-    nearest_m: FloatArray
-    known_m: FloatArray
+    nearest_m: Vector
+    known_m: Vector
     blind_m: float = 0.0
     floor_from_m: float = 0.0
     up_tan: float = math.inf

@@ -29,7 +29,7 @@ from vision.bodies.adoption import adopt, inherited
 from vision.bodies.arrivals import Changes, ViewMemory, arriving
 from vision.bodies.judgement import judge
 from vision.bodies.tracks import Tracks
-from vision.depth import connected, regions
+from vision.depth import connected, occlusion, regions
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import BoolGrid
 from vision.depth.free_space import free_space
@@ -105,7 +105,7 @@ class Tracker:
             self._free.remember(grid, pose, detection.captured_ns)
         labels, whole, measured = self._label(detection, above_floor, changes, velocities, elapsed_s)
         sightings.update_from_surfaces(
-            tracks, detection, regions.with_occlusion(grid, labels, measured), self._config.depth_noise
+            tracks, detection, occlusion.with_occlusion(grid, labels, measured), self._config.depth_noise
         )
         if tracks.overhead.any():
             tracks.overhead &= ~births.reaching_down(grid, whole, len(tracks), self._body_height_m)

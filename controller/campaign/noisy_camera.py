@@ -77,18 +77,14 @@ class NoisyCamera:
     def _free_space(self, view: PlanarView) -> FreeSpace:
         """The free space: for each band, the nearest surface at the robot's height, and how far the floor is
         free."""
-        noise, planar_camera = self._noise, self.planar_camera
+        planar_camera = self.planar_camera
         distances, blank = _scan_bands(
-            view.bodies,
-            view.forward_m,
-            view.free_m,
+            view,
+            planar_camera,
+            self._noise,
             self._has_depth,
             self._glass,
             self._random.standard_normal(len(view.free_m)),
-            noise.surface_bias_sigmas,
-            noise.surface_sigmas,
-            noise.depth_sigma_1pm,
-            planar_camera.range_m,
             self._min_depth_m,
         )
         return FreeSpace(
@@ -108,21 +104,14 @@ def mount_of(robot: Robot) -> CameraMount:
     return CameraMount(mount.forward_m, mount.left_m, mount.height_m, mount.pitch_rad)
 
 
-@compiled(
-    "int64[::1], float64[:, ::1], float64[::1], boolean[::1], boolean[::1], float64[::1],"
-    "float64, float64, float64, float64, float64"
-)
+@compiled(PlanarView, PlanarCamera, NoiseModel, "boolean[::1], boolean[::1], float64[::1], float64")
 def _scan_bands(
-    bodies: NDArray[np.intp],
-    forward_m: FloatArray,
-    free_m: FloatArray,
+    view: PlanarView,
+    camera: PlanarCamera,
+    noise: NoiseModel,
     has_depth: NDArray[np.bool_],
     glass: NDArray[np.bool_],
     errors: FloatArray,
-    bias_sigmas: float,
-    sigmas: float,
-    depth_sigma_1pm: float,
-    range_m: float,
     min_depth_m: float,
 ) -> tuple[FloatArray, NDArray[np.bool_]]:
     """nearest_m and known_m (2, B), and blank (B,) of FreeSpace.
@@ -130,23 +119,24 @@ def _scan_bands(
     has_depth, glass: (N,), which bodies have depth, and which are made of glass.
     errors: (B,), standard normal errors of depth.
     """
-    bands = len(free_m)
+    bands, free_m, range_m = len(view.free_m), view.free_m, camera.range_m
     distances, blank = np.empty((2, bands)), np.zeros(bands, np.bool_)
     nearest, known = distances
     for b in range(bands):
         surface, nearest_glass = math.inf, math.inf
-        for row in range(len(bodies)):
-            if has_depth[bodies[row]]:
-                surface = min(surface, forward_m[row, b])
-            elif glass[bodies[row]]:
-                nearest_glass = min(nearest_glass, forward_m[row, b])
+        for row in range(len(view.bodies)):
+            if has_depth[view.bodies[row]]:
+                surface = min(surface, view.forward_m[row, b])
+            elif glass[view.bodies[row]]:
+                nearest_glass = min(nearest_glass, view.forward_m[row, b])
         if free_m[b] <= min(surface, range_m) and nearest_glass > free_m[b]:
             surface = free_m[b]  # the building
         # There is no depth of glass, nor of anything behind it.
         if nearest_glass < surface:
             surface = math.inf
         if surface < math.inf:
-            surface += depth_sigma_1pm * surface * surface * (sigmas * errors[b] - bias_sigmas)
+            sigmas = noise.surface_sigmas * errors[b] - noise.surface_bias_sigmas
+            surface += noise.depth_sigma_1pm * surface * surface * sigmas
         if not surface < range_m:
             surface = math.inf
         blank[b] = surface < min_depth_m

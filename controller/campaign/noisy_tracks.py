@@ -65,48 +65,23 @@ class NoisyTracks:
 
     def update(self, view: PlanarView, t_s: float, random: np.random.Generator) -> None:
         """Update the tracks with the bodies in this frame."""
-        noise, camera = self._noise, self._camera
         draws = random.random(len(self._tracks))
         self._tracks = _updated(
             self._tracks,
-            view.bodies,
-            view.forward_m,
+            view,
+            self._camera,
+            self._noise,
             self._is_obstacle,
             draws,
-            camera.bearing_tan,
-            camera.half_width_tan,
-            camera.range_m,
             self._min_depth_m,
-            view.camera_pose,
             t_s,
             self._period_s,
-            noise.miss_rate,
-            noise.miss_rate_at_range,
-            noise.moving_mps,
-            noise.moving_per_m,
-            noise.rise_s,
-            noise.fall_s,
-            noise.forget_s,
         )
 
     def obstacles(self, view: PlanarView, t_s: float) -> tuple[Obstacle, ...]:
         """The obstacles as perception reports them for this view."""
-        noise = self._noise
         reported, vectors, covariances = _reported(
-            self._tracks,
-            self._centre_height_m,
-            self._to_optical,
-            view.camera_pose,
-            t_s,
-            noise.sightings,
-            noise.tracked_depth_ratio * noise.depth_sigma_1pm,
-            noise.lateral_sigma_m,
-            noise.radial_velocity_mps,
-            noise.radial_velocity_per_m,
-            noise.lateral_velocity_mps,
-            noise.lateral_velocity_per_m,
-            noise.first_velocity_mps,
-            noise.first_velocity_decay_s,
+            self._tracks, self._centre_height_m, self._to_optical, view.camera_pose, t_s, self._noise
         )
         return tuple(
             [
@@ -170,53 +145,51 @@ def _visible_extent(
 
 
 @inlined
-def _update_motion(track: FloatArray, fast: bool, dt_s: float, rise_s: float, fall_s: float) -> None:
+def _update_motion(track: FloatArray, fast: bool, dt_s: float, noise: NoiseModel) -> None:
     """Update whether the body moves, with hysteresis. fast: whether it was fast in this frame."""
     if fast:
-        track[_FAST_S] = min(track[_FAST_S] + dt_s, rise_s + dt_s)
-        if track[_FAST_S] >= rise_s:
+        track[_FAST_S] = min(track[_FAST_S] + dt_s, noise.rise_s + dt_s)
+        if track[_FAST_S] >= noise.rise_s:
             track[_MOVING] = 1.0
     else:
-        track[_FAST_S] -= dt_s * rise_s / fall_s
+        track[_FAST_S] -= dt_s * noise.rise_s / noise.fall_s
         if track[_FAST_S] <= 0.0:
             track[_FAST_S] = track[_MOVING] = 0.0
 
 
 @compiled(
-    "float64[:, ::1], int64[::1], float64[:, ::1], boolean[::1], float64[::1], float64[::1],"
-    "float64, float64, float64, UniTuple(float64, 4), float64, float64, float64, float64, float64, float64,"
-    "float64, float64, float64"
+    "float64[:, ::1]",
+    PlanarView,
+    PlanarCamera,
+    NoiseModel,
+    "boolean[::1], float64[::1], float64, float64, float64",
 )
 def _updated(
     tracks: FloatArray,
-    bodies: NDArray[np.intp],
-    forward_m: FloatArray,
+    view: PlanarView,
+    camera: PlanarCamera,
+    noise: NoiseModel,
     is_obstacle: BoolArray,
     draws: FloatArray,
-    bearing_tan: FloatArray,
-    half_width_tan: float,
-    range_m: float,
     min_depth_m: float,
-    eye: Eye,
     t_s: float,
     dt_s: float,
-    miss_rate: float,
-    miss_rate_at_range: float,
-    moving_mps: float,
-    moving_per_m: float,
-    rise_s: float,
-    fall_s: float,
-    forget_s: float,
 ) -> FloatArray:
-    """The tracks (N, C) after a frame that shows bodies (M,) at distances forward_m (M, B). A body is missed
-    if its random draw (N,) in 0..1 is less than the miss rate at its distance."""
-    camera_x, camera_y, cos, sin = eye
+    """The tracks (N, C) after a frame with this view.
+
+    A body is missed if its random draw (N,) in 0..1 is less than the miss rate at its distance.
+    """
+    camera_x, camera_y, cos, sin = view.camera_pose
     tracks = tracks.copy()
     last_id = tracks[:, _ID].max() if len(tracks) else 0.0
-    for row in range(len(bodies)):
-        body = bodies[row]
-        near, far, left, right = _visible_extent(forward_m[row], bearing_tan, half_width_tan, min_depth_m)
-        miss_probability = max(miss_rate, miss_rate_at_range * (2.0 * near / range_m - 1.0))
+    for row in range(len(view.bodies)):
+        body = view.bodies[row]
+        near, far, left, right = _visible_extent(
+            view.forward_m[row], camera.bearing_tan, camera.half_width_tan, min_depth_m
+        )
+        miss_probability = max(
+            noise.miss_rate, noise.miss_rate_at_range * (2.0 * near / camera.range_m - 1.0)
+        )
         if math.isinf(near) or not is_obstacle[body] or draws[body] < miss_probability:
             continue
         track = tracks[body]
@@ -230,37 +203,27 @@ def _updated(
         track[_X] = camera_x + forward * cos + lateral * sin
         track[_Y] = camera_y + forward * sin - lateral * cos
         track[_WIDTH], track[_DEPTH] = right - left, far - near
-        fast = math.hypot(track[_VX], track[_VY]) > moving_mps + moving_per_m * forward
-        _update_motion(track, fast, dt_s, rise_s, fall_s)
+        fast = math.hypot(track[_VX], track[_VY]) > noise.moving_mps + noise.moving_per_m * forward
+        _update_motion(track, fast, dt_s, noise)
     for k in range(len(tracks)):
-        if tracks[k, _SEEN_S] < t_s - forget_s:
+        if tracks[k, _SEEN_S] < t_s - noise.forget_s:
             tracks[k, _SIGHTINGS] = tracks[k, _FAST_S] = tracks[k, _MOVING] = 0.0
     return tracks
 
 
-@compiled(
-    "float64[:, ::1], float64[::1], float64[:, ::1], UniTuple(float64, 4), float64, int64,"
-    "float64, float64, float64, float64, float64, float64, float64, float64"
-)
+@compiled("float64[:, ::1], float64[::1], float64[:, ::1], UniTuple(float64, 4), float64", NoiseModel)
 def _reported(
     tracks: FloatArray,
     centre_height_m: FloatArray,
     to_optical: FloatArray,
     eye: Eye,
     t_s: float,
-    sightings: int,
-    depth_sigma_1pm: float,
-    lateral_sigma_m: float,
-    radial_mps: float,
-    radial_per_m: float,
-    lateral_mps: float,
-    lateral_per_m: float,
-    first_mps: float,
-    decay_s: float,
+    noise: NoiseModel,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """The R bodies that are reported: id, whether it moves, times since its first and last sighting (R, 4);
     position, extent and velocity in optical axes (R, 3, 3); covariance of the velocity (R, 3, 3)."""
     camera_x, camera_y, cos, sin = eye
+    depth_sigma_1pm = noise.tracked_depth_ratio * noise.depth_sigma_1pm
     count, found = len(tracks), 0
     reported, vectors, covariances = np.empty((count, 4)), np.empty((count, 3, 3)), np.empty((count, 3, 3))
     for k in range(count):
@@ -268,14 +231,15 @@ def _reported(
         errors = track[_ERRORS:]
         dx, dy = track[_X] - camera_x, track[_Y] - camera_y
         ahead, left = dx * cos + dy * sin, dy * cos - dx * sin
-        if track[_SIGHTINGS] < sightings or not ahead > 0.0:
+        if track[_SIGHTINGS] < noise.sightings or not ahead > 0.0:
             continue
         seen_ahead = ahead + depth_sigma_1pm * ahead * ahead * errors[0]
-        seen_left = left + lateral_sigma_m * errors[1]
-        radial, lateral = radial_mps + radial_per_m * ahead, lateral_mps + lateral_per_m * ahead
+        seen_left = left + noise.lateral_sigma_m * errors[1]
+        radial = noise.radial_velocity_mps + noise.radial_velocity_per_m * ahead
+        lateral = noise.lateral_velocity_mps + noise.lateral_velocity_per_m * ahead
         away_mps = track[_VX] * cos + track[_VY] * sin + radial * errors[2]
         left_mps = track[_VY] * cos - track[_VX] * sin + lateral * errors[3]
-        initial = first_mps * math.exp(-(t_s - track[_FIRST_S]) / decay_s)
+        initial = noise.first_velocity_mps * math.exp(-(t_s - track[_FIRST_S]) / noise.first_velocity_decay_s)
         radial, lateral = (radial + initial) ** 2, (lateral + initial) ** 2
         vertical = (_VERTICAL_SIGMA_MPS + initial) ** 2
         reported[found] = track[_ID], track[_MOVING], t_s - track[_FIRST_S], t_s - track[_SEEN_S]

@@ -11,9 +11,10 @@ import numpy as np
 from config.robot import Robot
 from controller import braking
 from controller.campaign.baseline_policy import decision, free_speed
-from controller.decision.bodies import Bodies, bodies_of
+from controller.decision.bodies import Bodies
 from controller.decision.corridor import Corridor, path_velocities, place
 from controller.decision.decision import Decision
+from controller.decision.obstacle_boxes import bodies_of
 from controller.decision.situation import Situation
 from hal.types import CameraMount
 from vision.scene import Scene

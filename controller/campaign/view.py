@@ -4,6 +4,7 @@ footprints."""
 from __future__ import annotations
 
 import math
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from config.camera import SimulatedCameraConfig
 from config.robot import Mount
 from hal.compiled import compiled, inlined
 from hal.records import record
-from hal.types import FloatArray, PlanarPose
+from hal.types import FloatArray, Integers, Matrix, PlanarPose, Vector
 from sim.planar import PlanarWorld
 from vision.scene import NEVER_M
 
@@ -20,7 +21,7 @@ IntArray = NDArray[np.intp]
 BoolArray = NDArray[np.bool_]
 
 # x_m and y_m of the camera on the floor, and the cosine and sine of where it looks.
-Eye = tuple[float, float, float, float]
+Eye = Annotated[tuple[float, float, float, float], "UniTuple(float64, 4)"]
 
 BANDS = 80
 _NEAR_M = 0.1
@@ -38,9 +39,9 @@ class PlanarView:
     camera_pose: PlanarCamera.camera_pose().
     """
 
-    bodies: IntArray
-    forward_m: FloatArray
-    free_m: FloatArray
+    bodies: Integers
+    forward_m: Matrix
+    free_m: Vector
     camera_pose: Eye
 
 
@@ -48,8 +49,15 @@ class PlanarCamera:
     """A pinhole camera with its height and pitch.
 
     bearing_tan: (B,), right divided by forward, of the ray of each band.
+    half_width_tan: half the width of a band, in the same unit.
+    range_m: how far it sees.
     floor_from_m, up_tan: as in FreeSpace.
     """
+
+    bearing_tan: Vector
+    half_width_tan: float
+    range_m: float
+    up_tan: float
 
     def __init__(
         self,
@@ -78,17 +86,14 @@ class PlanarCamera:
         """The view from the robot at pose. polygons: (N, K, 2), footprints of all bodies."""
         camera_pose = self.camera_pose(pose)
         bodies, forward_m, free_m = _render(
+            self,
             polygons,
             self._room,
             self._z_m,
             self._occludes,
-            self.bearing_tan,
-            self.half_width_tan,
             self._edge_tan,
-            self.range_m,
-            self._mount.height_m,
             self._down_tan,
-            self.up_tan,
+            self._mount.height_m,
             camera_pose,
         )
         return PlanarView(bodies, forward_m, free_m, camera_pose)
@@ -169,24 +174,23 @@ def _add_thin_body(
 
 
 @compiled(
-    "float64[:, :, ::1], float64[:, ::1], float64[:, ::1], boolean[::1], float64[::1], float64, float64,"
-    "float64, float64, float64, float64, UniTuple(float64, 4)"
+    PlanarCamera,
+    "float64[:, :, ::1], float64[:, ::1], float64[:, ::1], boolean[::1], float64, float64, float64,"
+    "UniTuple(float64, 4)",
 )
 def _render(
+    camera: PlanarCamera,
     polygons: FloatArray,
     room: FloatArray,
     z_m: FloatArray,
     occludes: BoolArray,
-    bearing_tan: FloatArray,
-    half_width_tan: float,
     edge_tan: float,
-    range_m: float,
-    camera_height_m: float,
     down_tan: float,
-    up_tan: float,
+    height_m: float,
     eye: Eye,
 ) -> tuple[IntArray, FloatArray, FloatArray]:
-    """The fields of PlanarView for a camera at eye, camera_height_m above the floor."""
+    """The fields of PlanarView for a camera at eye, height_m above the floor."""
+    bearing_tan, range_m = camera.bearing_tan, camera.range_m
     count, corners, bands = len(polygons), polygons.shape[1], len(bearing_tan)
     bodies, hits = np.empty(count, np.intp), np.empty((count, bands))
     forward, right, free = np.empty(len(room) + 1), np.empty(len(room) + 1), np.empty(bands)
@@ -198,7 +202,7 @@ def _render(
         if not _may_be_in_view(forward, right, edge_tan, range_m):
             continue
         if not _cast_rays(forward, right, bearing_tan, hits[in_view]):
-            _add_thin_body(forward, right, bearing_tan, half_width_tan, hits[in_view])
+            _add_thin_body(forward, right, bearing_tan, camera.half_width_tan, hits[in_view])
         if occludes[k]:
             for b in range(bands):
                 free[b] = min(free[b], hits[in_view, b])
@@ -210,9 +214,7 @@ def _render(
             z = hits[row, b]
             # A body is in the frame if part of its height is between the upper and lower edge of the image.
             in_frame = (
-                z < range_m
-                and high_m > camera_height_m - z * down_tan
-                and low_m < camera_height_m + z * up_tan
+                z < range_m and high_m > height_m - z * down_tan and low_m < height_m + z * camera.up_tan
             )
             if z > free[b] + _TOLERANCE_M or not in_frame:
                 hits[row, b] = math.inf

@@ -5,11 +5,13 @@ The files in the order of one control step:
 * situation.py - the input: newest scene, path, robot pose, speed
 * decide.py - one control step: checks the input, asks all below, takes the least limit
 * world_model.py - takes in each new scene with the files from here to blind_corners.py; judges the camera
-* bodies.py - obstacles as boxes on the floor
+* obstacle_boxes.py - makes boxes on the floor of the obstacles
+* bodies.py - these boxes, as arrays
 * surfaces.py - the free space as points on the floor
 * velocity_filter.py - averages the measured velocities; how fast those who set off may become
 * out_of_view.py - keeps bodies that have left the view
 * unseen_motion.py - which of them move, and with which velocity
+* unseen_position.py - where the movers among them are expected
 * view_edges.py - what is below, above or beside the view
 * seen_through.py - whether the place of a body that went missing is seen, and seen empty
 * lens_cover.py - whether something covers the lens

@@ -9,7 +9,6 @@ controller/decision/sight.py calls BlindCorners once a scene.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +16,7 @@ from numpy.typing import NDArray
 from config.decision import SightConfig
 from hal.compiled import compiled, inlined
 from hal.records import record
-from hal.types import FloatArray
+from hal.types import Integers, Vector
 
 IntArray = NDArray[np.intp]
 
@@ -49,11 +48,11 @@ class SurfacesOnPath:
     half_width_m: (P,) half of the swept width there.
     """
 
-    bands: IntArray
-    forward_m: FloatArray
-    s_m: FloatArray
-    d_m: FloatArray
-    half_width_m: FloatArray
+    bands: Integers
+    forward_m: Vector
+    s_m: Vector
+    d_m: Vector
+    half_width_m: Vector
 
 
 @dataclass(slots=True)
@@ -62,15 +61,6 @@ class _Corner:
     left: bool
     beside_m: float
     score: int
-
-
-class _Points(NamedTuple):
-    """P surfaces for the compiled steps; the fields of SurfacesOnPath."""
-
-    bands: IntArray
-    forward_m: FloatArray
-    s_m: FloatArray
-    d_m: FloatArray
 
 
 @record(frozen=True, slots=True)
@@ -105,17 +95,7 @@ class BlindCorners:
             # Nearer than _SURE_M, a corner is not given up for not being seen.
             corner.score -= 1 if corner.s_m - front_s_m > _SURE_M else 0
         s_m, d_m, half_width_m = surfaces.s_m, surfaces.d_m, surfaces.half_width_m
-        ends = _blind_ends(
-            surfaces.bands,
-            surfaces.forward_m,
-            s_m,
-            d_m,
-            half_width_m,
-            stands,
-            band_tan,
-            front_s_m,
-            self._beside_m,
-        )
+        ends = _blind_ends(surfaces, stands, band_tan, front_s_m, self._beside_m)
         for end in ends.tolist():
             beside_m = float(abs(d_m[end]) - half_width_m[end])
             self._note(float(s_m[end]), bool(d_m[end] > 0.0), beside_m)
@@ -147,7 +127,7 @@ def _band_spacing_m(forward_m: float, d_m: float, band_tan: float) -> float:
 
 
 @inlined
-def _goes_on(points: _Points, last: int, k: int, band_tan: float) -> bool:
+def _goes_on(points: SurfacesOnPath, last: int, k: int, band_tan: float) -> bool:
     """Whether point k belongs to the same face as the point last."""
     along_m = points.s_m[k] - points.s_m[last]
     spacing_m = _band_spacing_m(points.forward_m[last], points.d_m[last], band_tan)
@@ -159,7 +139,7 @@ def _goes_on(points: _Points, last: int, k: int, band_tan: float) -> bool:
 
 
 @inlined
-def _passage_behind(points: _Points, end: int, beyond: int, band_tan: float) -> bool:
+def _passage_behind(points: SurfacesOnPath, end: int, beyond: int, band_tan: float) -> bool:
     """Whether a passage may be hidden past the end of a face: the next band, that of point beyond, has no
     surface, or one that is farther away by more than a passage."""
     if not 0 <= beyond < len(points.bands) or abs(points.bands[beyond] - points.bands[end]) != 1:
@@ -169,20 +149,16 @@ def _passage_behind(points: _Points, end: int, beyond: int, band_tan: float) -> 
 
 
 @inlined
-def _ends_blind(points: _Points, first: int, last: int, inward: int, band_tan: float) -> bool:
+def _ends_blind(points: SurfacesOnPath, first: int, last: int, inward: int, band_tan: float) -> bool:
     """Whether the face from point first to last is long enough, and a passage may be hidden behind it."""
     if last < 0 or not points.s_m[last] - points.s_m[first] >= _FACE_M:
         return False
     return _passage_behind(points, last, last + inward, band_tan)
 
 
-@compiled("int64[:], float64[:], float64[:], float64[:], float64[:], boolean[:], float64, float64, float64")
+@compiled(SurfacesOnPath, "boolean[:], float64, float64, float64")
 def _blind_ends(
-    bands: IntArray,
-    forward_m: FloatArray,
-    s_m: FloatArray,
-    d_m: FloatArray,
-    half_width_m: FloatArray,
+    points: SurfacesOnPath,
     stands: NDArray[np.bool_],
     band_tan: float,
     front_s_m: float,
@@ -192,7 +168,7 @@ def _blind_ends(
 
     max_beside_m: faces farther beside the swept width do not matter.
     """
-    points, count, found = _Points(bands, forward_m, s_m, d_m), len(bands), 0
+    count, found = len(points.bands), 0
     ends = np.empty(count, np.intp)
     for inward in (-1, 1):
         # Each side is followed from the edge of the view inwards; on the right that is from the last band
@@ -200,9 +176,9 @@ def _blind_ends(
         first = last = -1  # of the present face; -1: none yet
         for n in range(count):
             k = n if inward > 0 else count - 1 - n
-            aside_m = abs(d_m[k]) - half_width_m[k]
-            close = stands[k] and 0.0 < aside_m <= max_beside_m and s_m[k] - front_s_m < _LOOK_AHEAD_M
-            if not close or (d_m[k] > 0.0) != (inward > 0):
+            aside_m, ahead_m = abs(points.d_m[k]) - points.half_width_m[k], points.s_m[k] - front_s_m
+            close = stands[k] and 0.0 < aside_m <= max_beside_m and ahead_m < _LOOK_AHEAD_M
+            if not close or (points.d_m[k] > 0.0) != (inward > 0):
                 continue
             if last < 0 or not _goes_on(points, last, k, band_tan):
                 if _ends_blind(points, first, last, inward, band_tan):

@@ -15,7 +15,7 @@ from controller.decision.bodies import Bodies
 from controller.path.path import Path
 from hal.compiled import compiled, inlined
 from hal.records import record
-from hal.types import FloatArray
+from hal.types import FloatArray, Matrix, Vector
 
 _STEP_M = 0.1
 # The path is searched from this far behind the robot.
@@ -28,6 +28,11 @@ class Corridor:
     half_widths_m (W,): sampled every _STEP_M, from overhang_m before the beginning of the path on.
     """
 
+    half_widths_m: Vector
+    overhang_m: float
+    front_m: float
+    rear_m: float
+
     def __init__(self, path: Path, body: Body) -> None:
         self.path = path
         self.front_m, self.rear_m, self.height_m = body.front_m, body.rear_m, body.height_m
@@ -39,7 +44,7 @@ class Corridor:
         half_m = body.width_m / 2.0
         radius = 1.0 / np.maximum(bend, 1e-9)
         outer = np.sqrt((radius + half_m) ** 2 + self.overhang_m**2) - radius
-        self.half_widths_m: FloatArray = np.where(bend > 1e-6, outer, half_m)
+        self.half_widths_m = np.where(bend > 1e-6, outer, half_m)
         self.straight = not (bend > 1e-6).any()
 
     def half_width(self, s_m: FloatArray) -> FloatArray:
@@ -63,13 +68,13 @@ class Placed:
     clearance_m: free floor between the body's side and the corridor; negative: inside it.
     """
 
-    s_m: FloatArray
-    d_m: FloatArray
-    heading_rad: FloatArray
-    half_s_m: FloatArray
-    block_from_s_m: FloatArray
-    block_to_s_m: FloatArray
-    clearance_m: FloatArray
+    s_m: Matrix
+    d_m: Matrix
+    heading_rad: Matrix
+    half_s_m: Matrix
+    block_from_s_m: Matrix
+    block_to_s_m: Matrix
+    clearance_m: Matrix
 
 
 def place(bodies: Bodies, corridor: Corridor, times_s: FloatArray, near_s_m: float, reach_m: float) -> Placed:
@@ -79,16 +84,7 @@ def place(bodies: Bodies, corridor: Corridor, times_s: FloatArray, near_s_m: flo
     """
     reach = near_s_m - _BEHIND_M, near_s_m + reach_m
     located = corridor.path.locate(bodies.xy_m, bodies.velocity_mps, times_s, *reach)
-    extents = _extents(
-        located,
-        bodies.view_rad,
-        bodies.half_view_m,
-        bodies.half_across_m,
-        corridor.half_widths_m,
-        corridor.overhang_m,
-        corridor.front_m,
-        corridor.rear_m,
-    )
+    extents = _extents(located, bodies, corridor)
     return Placed(*located, *extents)
 
 
@@ -114,17 +110,8 @@ def _half_widths(s_m: FloatArray, half_widths_m: FloatArray, overhang_m: float) 
     return half_width
 
 
-@compiled("float64[:, :, ::1], float64[:], float64[:], float64[:], float64[::1], float64, float64, float64")
-def _extents(
-    located: FloatArray,
-    view_rad: FloatArray,
-    half_view_m: FloatArray,
-    half_across_m: FloatArray,
-    half_widths_m: FloatArray,
-    overhang_m: float,
-    front_m: float,
-    rear_m: float,
-) -> FloatArray:
+@compiled("float64[:, :, ::1]", Bodies, Corridor)
+def _extents(located: FloatArray, bodies: Bodies, corridor: Corridor) -> FloatArray:
     """(4, N, K) half_s_m, block_from_s_m, block_to_s_m and clearance_m of Placed, for N bodies.
 
     located (3, N, K): s_m, d_m and heading_rad of Placed.
@@ -133,17 +120,17 @@ def _extents(
     extents = np.empty((4, *s_m.shape))
     half_s, block_from, block_to, clearance = extents
     for k in range(len(s_m)):
-        along, across = half_view_m[k], half_across_m[k]
+        along, across = bodies.half_view_m[k], bodies.half_across_m[k]
         cos = sin = 0.0
         for j in range(s_m.shape[1]):
             if j == 0 or heading_rad[k, j] != heading_rad[k, j - 1]:
-                turned = view_rad[k] - heading_rad[k, j]
+                turned = bodies.view_rad[k] - heading_rad[k, j]
                 cos, sin = abs(math.cos(turned)), abs(math.sin(turned))
             half_s[k, j] = cos * along + sin * across
-            block_from[k, j] = s_m[k, j] - half_s[k, j] - front_m
-            block_to[k, j] = s_m[k, j] + half_s[k, j] + rear_m
+            block_from[k, j] = s_m[k, j] - half_s[k, j] - corridor.front_m
+            block_to[k, j] = s_m[k, j] + half_s[k, j] + corridor.rear_m
             beside = abs(d_m[k, j]) - (sin * along + cos * across)
-            clearance[k, j] = beside - _half_width(s_m[k, j], half_widths_m, overhang_m)
+            clearance[k, j] = beside - _half_width(s_m[k, j], corridor.half_widths_m, corridor.overhang_m)
     return extents
 
 
@@ -156,36 +143,33 @@ class PathVelocities:
     innovation_along_mps, innovation_left_mps: by how much the newest measurement differs from them.
     """
 
-    along_mps: FloatArray
-    left_mps: FloatArray
-    sigma_along_mps: FloatArray
-    sigma_left_mps: FloatArray
-    innovation_along_mps: FloatArray
-    innovation_left_mps: FloatArray
+    along_mps: Vector
+    left_mps: Vector
+    sigma_along_mps: Vector
+    sigma_left_mps: Vector
+    innovation_along_mps: Vector
+    innovation_left_mps: Vector
 
 
 def path_velocities(bodies: Bodies, heading_rad: FloatArray) -> PathVelocities:
     """The velocities relative to the path. heading_rad (N,): heading of the path where each body is."""
-    return PathVelocities(
-        *_seen_along(bodies.velocity_mps, bodies.innovation_mps, bodies.covariance, heading_rad)
-    )
+    return PathVelocities(*_seen_along(bodies, heading_rad))
 
 
-@compiled("float64[:, :], float64[:, :], float64[:, :, :], float64[:]")
-def _seen_along(
-    velocity_mps: FloatArray, innovation_mps: FloatArray, covariance: FloatArray, heading_rad: FloatArray
-) -> FloatArray:
+@compiled(Bodies, "float64[:]")
+def _seen_along(bodies: Bodies, heading_rad: FloatArray) -> FloatArray:
     """(6, N) the fields of PathVelocities."""
     velocities = np.empty((6, len(heading_rad)))
     along, left, sigma_along, sigma_left, more_along, more_left = velocities
     for k in range(len(heading_rad)):
         cos, sin = math.cos(heading_rad[k]), math.sin(heading_rad[k])
-        x, y = velocity_mps[k, 0], velocity_mps[k, 1]
+        x, y = bodies.velocity_mps[k]
         along[k], left[k] = x * cos + y * sin, y * cos - x * sin
-        x, y = innovation_mps[k, 0], innovation_mps[k, 1]
+        x, y = bodies.innovation_mps[k]
         more_along[k], more_left[k] = x * cos + y * sin, y * cos - x * sin
-        xx, yy = covariance[k, 0, 0], covariance[k, 1, 1]
-        turned = (covariance[k, 0, 1] + covariance[k, 1, 0]) * cos * sin
+        spread = bodies.covariance[k]
+        xx, yy = spread[0, 0], spread[1, 1]
+        turned = (spread[0, 1] + spread[1, 0]) * cos * sin
         sigma_along[k] = math.sqrt(max(xx * cos * cos + turned + yy * sin * sin, 0.0))
         sigma_left[k] = math.sqrt(max(xx * sin * sin - turned + yy * cos * cos, 0.0))
     return velocities

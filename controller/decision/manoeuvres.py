@@ -8,14 +8,15 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from config.decision import Prediction
+from controller.decision.bodies import Bodies
+from controller.decision.corridor import PathVelocities, Placed
 from controller.decision.limits import ALONG_TO_SIDE_RATIO, UNSEEN_ERROR_SIGMAS
 from controller.decision.watched import Watched
 from hal.compiled import compiled
 from hal.records import record
-from hal.types import FloatArray
+from hal.types import FloatArray, Vector
 
 # Least sideways speed that is assumed when a body's direction of motion is judged.
 _MIN_SIDEWAYS_MPS = 0.1
@@ -34,91 +35,54 @@ class Manoeuvres:
     uncertain_along_m, uncertain_left_m: uncertainty of their positions.
     """
 
-    since_s: FloatArray
-    spread_along_mps: FloatArray
-    spread_left_mps: FloatArray
-    speed_mps: FloatArray
-    change_along_mps2: FloatArray
-    change_left_mps2: FloatArray
-    uncertain_along_m: FloatArray
-    uncertain_left_m: FloatArray
+    since_s: Vector
+    spread_along_mps: Vector
+    spread_left_mps: Vector
+    speed_mps: Vector
+    change_along_mps2: Vector
+    change_left_mps2: Vector
+    uncertain_along_m: Vector
+    uncertain_left_m: Vector
 
 
 def manoeuvres_of(watched: Watched, prediction: Prediction) -> Manoeuvres:
     """What the watched bodies may do."""
-    bodies, placed, velocities = watched.bodies, watched.placed, watched.velocities
     return Manoeuvres(
-        *_manoeuvres(
-            velocities.along_mps,
-            velocities.left_mps,
-            velocities.sigma_along_mps,
-            velocities.sigma_left_mps,
-            velocities.innovation_along_mps,
-            velocities.innovation_left_mps,
-            placed.d_m[:, 0],
-            placed.clearance_m[:, 0],
-            bodies.moving,
-            bodies.age_s,
-            bodies.unseen_s,
-            watched.since_s,
-            prediction.sigmas,
-            prediction.cut_in_mps2,
-            prediction.manoeuvre_mps2,
-            prediction.oncoming_mps2,
-            ALONG_TO_SIDE_RATIO,
-            UNSEEN_ERROR_SIGMAS,
-        )
+        *_manoeuvres(watched.bodies, watched.placed, watched.velocities, watched.since_s, prediction)
     )
 
 
-@compiled(
-    "float64[:], float64[:], float64[:], float64[:], float64[:], float64[:], float64[:], float64[:],"
-    "boolean[:], float64[:], float64[:], float64, float64, float64, float64, float64, float64, float64"
-)
+@compiled(Bodies, Placed, PathVelocities, "float64", Prediction)
 def _manoeuvres(
-    along_mps: FloatArray,
-    left_mps: FloatArray,
-    sigma_along_mps: FloatArray,
-    sigma_left_mps: FloatArray,
-    innovation_along_mps: FloatArray,
-    innovation_left_mps: FloatArray,
-    d_m: FloatArray,
-    clearance_m: FloatArray,
-    moving: NDArray[np.bool_],
-    age_s: FloatArray,
-    unseen_s: FloatArray,
-    since_s: float,
-    sigmas: float,
-    cut_in_mps2: float,
-    manoeuvre_mps2: float,
-    oncoming_mps2: float,
-    along_to_side_ratio: float,
-    unseen_error_sigmas: float,
+    bodies: Bodies, placed: Placed, velocities: PathVelocities, since_s: float, prediction: Prediction
 ) -> FloatArray:
     """(8, N) the fields of Manoeuvres."""
-    answers = np.zeros((8, len(along_mps)))
+    count = len(bodies.moving)
+    answers = np.zeros((8, count))
     since, spread_along, spread_left, speed, along, sideways, uncertain_along, uncertain_left = answers
-    for k in range(len(along_mps)):
+    for k in range(count):
+        along_mps, left_mps, unseen_s = velocities.along_mps[k], velocities.left_mps[k], bodies.unseen_s[k]
+        sigma_along_mps, sigma_left_mps = velocities.sigma_along_mps[k], velocities.sigma_left_mps[k]
         # unaware: goes in the robot's direction, so it does not see the robot coming and is beside it for
         # long. comes: comes towards the robot, sees it after a while and keeps its lane. leaves: moves away
         # from the path. All but comes and leaves may have changed their velocity since they left the view.
         # Out of view it cannot be seen to keep its lane, so there it must come nearly straight.
-        aslant_mps = max(abs(left_mps[k]), _MIN_SIDEWAYS_MPS)
-        outwards, beside = left_mps[k] * d_m[k] > 0.0, clearance_m[k] > 0.0
-        unaware = along_mps[k] > (along_to_side_ratio if outwards else 1.0) * aslant_mps
-        comes = along_mps[k] < -(along_to_side_ratio if unseen_s[k] > 0.0 else 1.0) * aslant_mps
+        aslant_mps = max(abs(left_mps), _MIN_SIDEWAYS_MPS)
+        outwards, beside = left_mps * placed.d_m[k, 0] > 0.0, placed.clearance_m[k, 0] > 0.0
+        unaware = along_mps > (ALONG_TO_SIDE_RATIO if outwards else 1.0) * aslant_mps
+        comes = along_mps < -(ALONG_TO_SIDE_RATIO if unseen_s > 0.0 else 1.0) * aslant_mps
         leaves = outwards and beside and not unaware
-        if moving[k]:
+        if bodies.moving[k]:
             # A body that turns into the way also slows down along the path.
-            along[k] = cut_in_mps2 if unaware and beside else manoeuvre_mps2
-            sideways[k] = cut_in_mps2 if unaware else manoeuvre_mps2
-            if comes and age_s[k] >= _AWARE_AFTER_S:
-                sideways[k] = oncoming_mps2
-        since[k] = since_s + (0.0 if comes or leaves else unseen_s[k])
-        speed[k] = math.hypot(along_mps[k], left_mps[k])
-        spread_along[k] = max(sigmas * sigma_along_mps[k], abs(innovation_along_mps[k]))
-        spread_left[k] = max(sigmas * sigma_left_mps[k], abs(innovation_left_mps[k]))
+            along[k] = prediction.cut_in_mps2 if unaware and beside else prediction.manoeuvre_mps2
+            sideways[k] = prediction.cut_in_mps2 if unaware else prediction.manoeuvre_mps2
+            if comes and bodies.age_s[k] >= _AWARE_AFTER_S:
+                sideways[k] = prediction.oncoming_mps2
+        since[k] = since_s + (0.0 if comes or leaves else unseen_s)
+        speed[k] = math.hypot(along_mps, left_mps)
+        spread_along[k] = max(prediction.sigmas * sigma_along_mps, abs(velocities.innovation_along_mps[k]))
+        spread_left[k] = max(prediction.sigmas * sigma_left_mps, abs(velocities.innovation_left_mps[k]))
         if not leaves:
-            uncertain_along[k] = unseen_error_sigmas * unseen_s[k] * sigma_along_mps[k]
-            uncertain_left[k] = unseen_error_sigmas * unseen_s[k] * sigma_left_mps[k]
+            uncertain_along[k] = UNSEEN_ERROR_SIGMAS * unseen_s * sigma_along_mps
+            uncertain_left[k] = UNSEEN_ERROR_SIGMAS * unseen_s * sigma_left_mps
     return answers

@@ -23,7 +23,6 @@ body of the last scene that is missing in this one is kept while its place is no
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -35,13 +34,18 @@ from controller.decision.unseen_motion import (
     MIN_MOVER_HALF_WIDTH_M,
     MIN_TRACKED_S,
     may_enter_way,
-    significant_component,
     unseen_or_approaching,
     velocities_agree,
     with_measured_velocity,
 )
+from controller.decision.unseen_position import (
+    EDGE_TOLERANCE_M,
+    EDGE_TOLERANCE_MPS,
+    extrapolated,
+    pushed_out_of_view,
+)
 from controller.decision.velocity_filter import missing_to_walking
-from controller.decision.view_edges import ViewEdges, beyond_edges, out_of_view
+from controller.decision.view_edges import ViewEdges, out_of_view
 from hal.clocks import NS_PER_S
 from hal.compiled import compiled
 from hal.types import CameraMount, FloatArray, PlanarPose
@@ -55,13 +59,6 @@ IntArray = NDArray[np.int64]
 _SAME_PLACE_M = 0.25
 # How long a mover is kept: in general, and if it may come into the robot's way.
 _MOVING_KEPT_S, _MAY_ENTER_KEPT_S = 2.0, 6.0
-# A place this far inside the side edge of the view still counts as outside; of a mover, for each second since
-# it was last seen, this much more.
-_EDGE_TOLERANCE_M, _EDGE_TOLERANCE_MPS = 0.3, 0.15
-_MIN_AXIS_DISTANCE_M = 0.1  # least distance from the camera's axis of a mover that was not seen to come in
-# A body out of view may have changed its velocity by this much per second.
-_VELOCITY_CHANGE_MPS2 = 0.25
-_ROUNDING = 1e-6
 _STRIP_REACH_M = 0.5  # a strip this near to a kept mover may be a part of it
 
 
@@ -132,7 +129,7 @@ class OutOfView:
             self._seen_through.forget()
             return no_bodies(seen.captured_ns)
         some_move = np.count_nonzero(bodies.moving) > 0
-        xy_m = self._extrapolated(bodies, dt_s, pose) if some_move else bodies.xy_m
+        xy_m = extrapolated(bodies, dt_s, pose, self._mount) if some_move else bodies.xy_m
         bodies = bodies.moved_to(seen.captured_ns, xy_m, bodies.unseen_s + dt_s)
         out = self._outside_view(bodies, pose, edges) | unproven(bodies, pose, self._mount, edges, free)
         kept = self._still_there(bodies, since_s, seen, out, pose)
@@ -143,8 +140,10 @@ class OutOfView:
         if np.count_nonzero(kept) < len(kept):
             since_s, bodies = since_s[kept], bodies.select(kept)
         self._since_s = since_s
-        self._bodies = self._pushed_out_of_view(bodies, pose, edges, free) if some_move else bodies
-        return self._bodies
+        if some_move:
+            bodies = pushed_out_of_view(bodies, since_s, pose, self._mount, edges, free)
+        self._bodies = bodies
+        return bodies
 
     def _with_missing(
         self, before: Bodies, seen: Bodies, dt_s: float, standing: bool
@@ -177,80 +176,12 @@ class OutOfView:
         kept = _still_kept(out & timely, part_of, bodies.ids, seen.ids)
         return kept & ~_leftover_strips(bodies, kept)
 
-    def _extrapolated(self, bodies: Bodies, dt_s: float, pose: PlanarPose) -> FloatArray:
-        """(N, 2) the positions dt_s later at constant velocity.
-
-        A mover ahead of the camera that approaches its axis (by more than one standard deviation of the
-        sideways velocity) stays at least _MIN_AXIS_DISTANCE_M on its own side: had it crossed, it would have
-        been seen.
-        """
-        way = bodies.velocity_mps * dt_s
-        forward = np.array([math.cos(pose.heading_rad), math.sin(pose.heading_rad)])
-        leftward = np.array([-forward[1], forward[0]])
-        offset = bodies.xy_m - (pose.x_m, pose.y_m)
-        left = offset @ leftward - self._mount.left_m
-        side = np.where(left < 0.0, -1.0, 1.0)
-        ahead = offset @ forward - self._mount.forward_m - bodies.half_view_m > 0.0
-        sigma_mps = np.sqrt(leftward @ bodies.covariance @ leftward)
-        comes = bodies.moving & ahead & (-side * (bodies.velocity_mps @ leftward) > sigma_mps)
-        past_m = np.where(comes, np.maximum(_MIN_AXIS_DISTANCE_M - side * (left + way @ leftward), 0.0), 0.0)
-        xy: FloatArray = bodies.xy_m + way + (side * past_m)[:, None] * leftward
-        return xy
-
-    def _pushed_out_of_view(
-        self, bodies: Bodies, pose: PlanarPose, edges: ViewEdges, free: FreeSpace
-    ) -> Bodies:
-        """The bodies, with movers whose expected place is seen to be free moved outwards, out of the view.
-
-        They are moved sideways to the edge of the free space, and a velocity towards the axis is replaced by
-        its forward component. A body that approaches (by more than one standard deviation) is not moved
-        until it is late by _EDGE_TOLERANCE_M plus _EDGE_TOLERANCE_MPS for each second since it was last seen.
-        """
-        cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
-        forward, leftward = np.array([cos, sin]), np.array([-sin, cos])
-        offset = bodies.xy_m - (pose.x_m, pose.y_m)
-        ahead, left = offset @ forward - self._mount.forward_m, offset @ leftward - self._mount.left_m
-        near, far = ahead - bodies.half_view_m, ahead + bodies.half_view_m
-        within = ~beyond_edges(bodies, near, self._mount.height_m, edges)
-        side = np.where(left < 0.0, -1.0, 1.0)
-        inner = side * left - bodies.half_across_m
-        xy, velocity = bodies.xy_m.copy(), bodies.velocity_mps.copy()
-        covariance, unseen_s = bodies.covariance.copy(), bodies.unseen_s.copy()
-        for k in np.flatnonzero(bodies.moving & within & (near > 0.0)).tolist():
-            from_tan = float(min(inner[k] / near[k], inner[k] / far[k]))
-            outside_m = _seen_through_tan(free, float(side[k]), from_tan, float(far[k])) * far[k]
-            push_out_m = outside_m - inner[k]
-            inwards_mps = -side[k] * float(velocity[k] @ leftward)
-            comes = -side[k] * significant_component(velocity[k], covariance[k], leftward) > 0.0
-            if push_out_m < (_EDGE_TOLERANCE_M + _EDGE_TOLERANCE_MPS * unseen_s[k] if comes else -_ROUNDING):
-                continue
-            xy[k] += side[k] * push_out_m * leftward
-            if inwards_mps > 0.0:
-                velocity[k] = significant_component(velocity[k], covariance[k], forward) * forward
-            turned_mps = _VELOCITY_CHANGE_MPS2 * float(self._since_s[k])
-            np.fill_diagonal(covariance[k], np.maximum(np.diagonal(covariance[k]), turned_mps**2))
-            unseen_s[k] = 0.0
-        return replace(bodies, xy_m=xy, velocity_mps=velocity, covariance=covariance, unseen_s=unseen_s)
-
     def _outside_view(self, bodies: Bodies, pose: PlanarPose, edges: ViewEdges) -> BoolArray:
         """(N,) which are beside, below or above the view, and not far behind the camera (out_of_view).
 
         The side edge has a tolerance for the uncertainty of the position, which grows for movers.
         """
-        return out_of_view(bodies, pose, self._mount, edges, _EDGE_TOLERANCE_M, _EDGE_TOLERANCE_MPS)
-
-
-def _seen_through_tan(free: FreeSpace, side: float, from_tan: float, far_m: float) -> float:
-    """Tangent of the bearing, outwards, up to which all bands from from_tan on are seen free to far_m.
-
-    side: 1 to the left, -1 to the right. -inf if the first band is not seen that far.
-    """
-    outwards = -side * free.bearing_tan
-    order = np.argsort(outwards)
-    order = order[outwards[order] + free.half_width_tan > from_tan - _ROUNDING]
-    closed = np.flatnonzero(~(free.known_m[order] >= far_m))
-    opened = order[: closed[0]] if len(closed) else order
-    return float(outwards[opened[-1]]) + free.half_width_tan if len(opened) else -math.inf
+        return out_of_view(bodies, pose, self._mount, edges, EDGE_TOLERANCE_M, EDGE_TOLERANCE_MPS)
 
 
 def _leftover_strips(bodies: Bodies, kept: BoolArray) -> BoolArray:

@@ -24,7 +24,7 @@ from controller.decision.manoeuvres import Manoeuvres
 from controller.profile import SpeedRamps
 from hal.compiled import compiled
 from hal.records import record
-from hal.types import FloatArray
+from hal.types import FlagMatrix, FloatArray, Matrix
 
 _STANDING_MPS = 0.02
 
@@ -37,9 +37,9 @@ class Reach:
     block_from_s_m, block_to_s_m: it could block the robot's positions between these.
     """
 
-    inside: NDArray[np.bool_]
-    block_from_s_m: FloatArray
-    block_to_s_m: FloatArray
+    inside: FlagMatrix
+    block_from_s_m: Matrix
+    block_to_s_m: Matrix
 
 
 def reach(
@@ -57,33 +57,15 @@ def reach(
     margin_m: added before each body.
     counts: (N,) which bodies count; the others block nothing.
     """
-    return Reach(
-        *_grown(
-            placed.clearance_m,
-            placed.block_from_s_m,
-            placed.block_to_s_m,
-            times_s,
-            manoeuvres.since_s,
-            manoeuvres.spread_along_mps,
-            manoeuvres.spread_left_mps,
-            manoeuvres.speed_mps,
-            manoeuvres.change_along_mps2,
-            manoeuvres.change_left_mps2,
-            manoeuvres.uncertain_along_m,
-            manoeuvres.uncertain_left_m,
-            max_mps,
-            margin_m,
-            counts,
-        )
-    )
+    return Reach(*_grown(placed, times_s, manoeuvres, max_mps, margin_m, counts))
 
 
 @record(frozen=True, slots=True, eq=False)
 class Stops:
     """R emergency stops at K times: distance_m (R, K); moves (R, K): whether the robot still moves."""
 
-    distance_m: FloatArray
-    moves: NDArray[np.bool_]
+    distance_m: Matrix
+    moves: FlagMatrix
 
 
 def stops(ramps: SpeedRamps, times_s: FloatArray) -> Stops:
@@ -97,15 +79,7 @@ def count_safe_stops(stopping: Stops, s_m: float, reached: Reach, counts: NDArra
 
     The robot starts at s_m. Once it stands, being touched is no fault of its own.
     """
-    return _first_that_touches(
-        stopping.distance_m,
-        stopping.moves,
-        s_m,
-        reached.inside,
-        reached.block_from_s_m,
-        reached.block_to_s_m,
-        counts,
-    )
+    return _first_that_touches(stopping, s_m, reached, counts)
 
 
 def last_stop_before_entry(stopping: Stops, reached: Reach) -> int:
@@ -120,67 +94,48 @@ def passes_clear(ramp: SpeedRamps, s_m: float, times_s: FloatArray, reached: Rea
     return count_safe_stops(Stops(distance_m, always), s_m, reached, all_bodies) == 1
 
 
-@compiled(
-    "float64[:, :], float64[:, :], float64[:, :], float64[:], float64[:], float64[:], float64[:], float64[:],"
-    "float64[:], float64[:], float64[:], float64[:], float64, float64, boolean[:]"
-)
+@compiled(Placed, "float64[:]", Manoeuvres, "float64, float64, boolean[:]")
 def _grown(
-    clearance_m: FloatArray,
-    block_from_s_m: FloatArray,
-    block_to_s_m: FloatArray,
+    placed: Placed,
     times_s: FloatArray,
-    since_s: FloatArray,
-    spread_along_mps: FloatArray,
-    spread_left_mps: FloatArray,
-    speed_mps: FloatArray,
-    change_along_mps2: FloatArray,
-    change_left_mps2: FloatArray,
-    uncertain_along_m: FloatArray,
-    uncertain_left_m: FloatArray,
+    by: Manoeuvres,
     max_mps: float,
     margin_m: float,
     counts: NDArray[np.bool_],
 ) -> tuple[NDArray[np.bool_], FloatArray, FloatArray]:
     """The fields of Reach."""
-    shape = len(since_s), len(times_s)
+    shape = len(by.since_s), len(times_s)
     inside, lo, hi = np.empty(shape, np.bool_), np.empty(shape), np.empty(shape)
     for k in range(shape[0]):
         # A body may stay in the way once it is there, so what it could block only grows.
         was_inside, lowest, highest = False, math.inf, -math.inf
         for j in range(shape[1]):
-            t = times_s[j] + since_s[k]
-            furthest = (max_mps + speed_mps[k]) * t
-            across = min(spread_left_mps[k] * t + 0.5 * change_left_mps2[k] * t * t, furthest)
-            if counts[k] and clearance_m[k, j] - (uncertain_left_m[k] + across) <= 0.0:
-                along = min(spread_along_mps[k] * t + 0.5 * change_along_mps2[k] * t * t, furthest)
-                along += uncertain_along_m[k]
+            t = times_s[j] + by.since_s[k]
+            furthest = (max_mps + by.speed_mps[k]) * t
+            across = min(by.spread_left_mps[k] * t + 0.5 * by.change_left_mps2[k] * t * t, furthest)
+            if counts[k] and placed.clearance_m[k, j] - (by.uncertain_left_m[k] + across) <= 0.0:
+                along = min(by.spread_along_mps[k] * t + 0.5 * by.change_along_mps2[k] * t * t, furthest)
+                along += by.uncertain_along_m[k]
                 was_inside = True
-                lowest = min(lowest, block_from_s_m[k, j] - along - margin_m)
-                highest = max(highest, block_to_s_m[k, j] + along)
+                lowest = min(lowest, placed.block_from_s_m[k, j] - along - margin_m)
+                highest = max(highest, placed.block_to_s_m[k, j] + along)
             inside[k, j], lo[k, j], hi[k, j] = was_inside, lowest, highest
     return inside, lo, hi
 
 
-@compiled("float64[:, :], boolean[:, :], float64, boolean[:, :], float64[:, :], float64[:, :], boolean[:]")
-def _first_that_touches(
-    distance_m: FloatArray,
-    moves: NDArray[np.bool_],
-    s_m: float,
-    inside: NDArray[np.bool_],
-    block_from_s_m: FloatArray,
-    block_to_s_m: FloatArray,
-    counts: NDArray[np.bool_],
-) -> int:
+@compiled(Stops, "float64", Reach, "boolean[:]")
+def _first_that_touches(stopping: Stops, s_m: float, reached: Reach, counts: NDArray[np.bool_]) -> int:
     """Index of the first of R stops that touches a body in counts (N,) while it moves; R: none."""
-    for i in range(len(distance_m)):
-        for j in range(distance_m.shape[1]):
-            if not moves[i, j]:
+    for i in range(len(stopping.moves)):
+        for j in range(stopping.moves.shape[1]):
+            if not stopping.moves[i, j]:
                 continue
-            at_m = s_m + distance_m[i, j]
-            for k in range(len(inside)):
-                if counts[k] and inside[k, j] and block_from_s_m[k, j] < at_m < block_to_s_m[k, j]:
+            at_m = s_m + stopping.distance_m[i, j]
+            for k in range(len(counts)):
+                blocks = reached.block_from_s_m[k, j] < at_m < reached.block_to_s_m[k, j]
+                if counts[k] and reached.inside[k, j] and blocks:
                     return i
-    return len(distance_m)
+    return len(stopping.moves)
 
 
 @compiled("boolean[:, :], boolean[:, :]")

@@ -81,21 +81,8 @@ def unproven(
     It is seen if every band that the body covers is free beyond it, or if one ends at a surface there.
     """
     speed_mps = np.hypot(bodies.measured_mps[:, 0], bodies.measured_mps[:, 1])
-    unseen = _unproven(
-        bodies.xy_m,
-        bodies.half_view_m,
-        bodies.half_across_m,
-        ~bodies.moving & (bodies.tracked_s >= _STOOD_S) & (speed_mps <= _STOOD_MPS),
-        pose.x_m,
-        pose.y_m,
-        pose.heading_rad,
-        mount.forward_m,
-        mount.left_m,
-        free.bearing_tan,
-        free.half_width_tan,
-        free.nearest_m,
-        free.known_m,
-    )
+    stood = ~bodies.moving & (bodies.tracked_s >= _STOOD_S) & (speed_mps <= _STOOD_MPS)
+    unseen = _unproven(bodies, stood, pose, mount, free)
     if np.count_nonzero(unseen):
         ahead, _ = _in_camera(bodies, pose, mount)
         unseen &= ~beyond_edges(bodies, ahead - bodies.half_view_m, mount.height_m, edges)
@@ -127,42 +114,28 @@ def _is_free(free: FreeSpace, bands: NDArray[np.bool_], far_m: float) -> bool:
     return len(seen) > 0 and bool(seen.all())
 
 
-@compiled(
-    "float64[:, :], float64[:], float64[:], boolean[:], float64, float64, float64, float64, float64,"
-    "float64[:], float64, float64[:], float64[:]"
-)
+@compiled(Bodies, "boolean[:]", PlanarPose, CameraMount, FreeSpace)
 def _unproven(
-    xy_m: FloatArray,
-    half_view_m: FloatArray,
-    half_across_m: FloatArray,
-    stood: NDArray[np.bool_],
-    x_m: float,
-    y_m: float,
-    heading_rad: float,
-    forward_m: float,
-    left_m: float,
-    bearing_tan: FloatArray,
-    half_width_tan: float,
-    nearest_m: FloatArray,
-    known_m: FloatArray,
+    bodies: Bodies, stood: NDArray[np.bool_], pose: PlanarPose, mount: CameraMount, free: FreeSpace
 ) -> NDArray[np.bool_]:
-    """unproven() in arrays, but for bodies below or above the view."""
-    cos, sin = math.cos(heading_rad), math.sin(heading_rad)
-    unseen = np.zeros(len(xy_m), np.bool_)
-    for k in range(len(xy_m)):
-        dx, dy = xy_m[k, 0] - x_m, xy_m[k, 1] - y_m
-        ahead, right = dx * cos + dy * sin - forward_m, left_m - (dy * cos - dx * sin)
-        near, far = ahead - half_view_m[k], ahead + half_view_m[k]
+    """As unproven(), but for bodies below or above the view. stood (N,): which bodies surely stood."""
+    cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
+    unseen = np.zeros(len(stood), np.bool_)
+    for k in range(len(stood)):
+        dx, dy = bodies.xy_m[k, 0] - pose.x_m, bodies.xy_m[k, 1] - pose.y_m
+        ahead, right = dx * cos + dy * sin - mount.forward_m, mount.left_m - (dy * cos - dx * sin)
+        half_view_m, half_across_m = bodies.half_view_m[k], bodies.half_across_m[k]
+        near, far = ahead - half_view_m, ahead + half_view_m
         if not (stood[k] and 0.0 < near <= _NEAR_M):
             continue
-        left_edge, right_edge = right - half_across_m[k], right + half_across_m[k]
-        first = min(left_edge / near, left_edge / far) - half_width_tan
-        last = max(right_edge / near, right_edge / far) + half_width_tan
-        covered, free, there = 0, 0, False
-        for b in range(len(bearing_tan)):
-            if first <= bearing_tan[b] <= last:
+        left_edge, right_edge = right - half_across_m, right + half_across_m
+        first = min(left_edge / near, left_edge / far) - free.half_width_tan
+        last = max(right_edge / near, right_edge / far) + free.half_width_tan
+        covered, seen_free, there = 0, 0, False
+        for b in range(len(free.bearing_tan)):
+            if first <= free.bearing_tan[b] <= last:
                 covered += 1
-                free += int(known_m[b] >= far and nearest_m[b] >= far)
-                there |= near - _AT_PLACE_M <= nearest_m[b] < far + _AT_PLACE_M
-        unseen[k] = covered > 0 and not there and free < covered
+                seen_free += int(free.known_m[b] >= far and free.nearest_m[b] >= far)
+                there |= near - _AT_PLACE_M <= free.nearest_m[b] < far + _AT_PLACE_M
+        unseen[k] = covered > 0 and not there and seen_free < covered
     return unseen

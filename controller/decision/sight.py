@@ -92,10 +92,7 @@ class Sight:
         self._update_view_edges(free)
         on_path = self._on_path(surfaces, s_m)
         in_corridor, nearest_s, clearance_m, stands = _surfaces_in_corridor(
-            on_path.bands,
-            on_path.s_m,
-            on_path.d_m,
-            on_path.half_width_m,
+            on_path,
             surfaces.half_band_m,
             surfaces.of(explained_by),
             explained_by.moving,
@@ -193,15 +190,9 @@ class Sight:
         return np.stack((x - np.sin(heading) * half * lanes, y + np.cos(heading) * half * lanes))
 
 
-@compiled(
-    "int64[:], float64[:], float64[:], float64[:], float64[:], boolean[:, :], boolean[:],"
-    "float64, float64, int64"
-)
+@compiled(SurfacesOnPath, "float64[:], boolean[:, :], boolean[:], float64, float64, int64")
 def _surfaces_in_corridor(
-    bands: NDArray[np.intp],
-    surface_s_m: FloatArray,
-    surface_d_m: FloatArray,
-    half_width_m: FloatArray,
+    on_path: SurfacesOnPath,
     half_band_m: FloatArray,
     belongs: BoolArray,
     moving: BoolArray,
@@ -216,25 +207,28 @@ def _surfaces_in_corridor(
     surfaces (P,) belong to no mover. belongs (P, N): which surfaces belong to which bodies. moving (N,):
     which bodies move.
     """
-    in_corridor, stands = np.zeros(bands_count, np.bool_), np.ones(len(bands), np.bool_)
+    count = len(on_path.bands)
+    in_corridor, stands = np.zeros(bands_count, np.bool_), np.ones(count, np.bool_)
     nearest_s = clearance_m = math.inf
-    counts = np.zeros(len(bands), np.bool_)
-    for i in range(len(bands)):
+    counts = np.zeros(count, np.bool_)
+    for i in range(count):
         explained = False
         for k in range(len(moving)):
             if belongs[i, k]:
                 explained = True
                 stands[i] &= not moving[k]
-        aside_m = abs(surface_d_m[i]) - half_band_m[i]
-        if aside_m <= half_width_m[i] + lateral_m and surface_s_m[i] > s_m:
-            in_corridor[bands[i]] = True
+        surface_s_m, half_width_m = on_path.s_m[i], on_path.half_width_m[i]
+        aside_m = abs(on_path.d_m[i]) - half_band_m[i]
+        if aside_m <= half_width_m + lateral_m and surface_s_m > s_m:
+            in_corridor[on_path.bands[i]] = True
             if not explained:
                 counts[i] = True
-                nearest_s = min(nearest_s, surface_s_m[i])
-    for i in range(len(bands)):
+                nearest_s = min(nearest_s, surface_s_m)
+    for i in range(count):
         # A wall across the way begins beside it.
-        if counts[i] and surface_s_m[i] <= nearest_s + _SAME_SURFACE_M:
-            clearance_m = min(clearance_m, abs(surface_d_m[i]) - half_band_m[i] - half_width_m[i])
+        if counts[i] and on_path.s_m[i] <= nearest_s + _SAME_SURFACE_M:
+            aside_m = abs(on_path.d_m[i]) - half_band_m[i]
+            clearance_m = min(clearance_m, aside_m - on_path.half_width_m[i])
     return in_corridor, nearest_s, clearance_m, stands
 
 

@@ -8,6 +8,10 @@ from hal.types import PlanarPose
 from vision.scene import Scene
 
 
+class SceneError(Exception):
+    """A scene contains impossible values: which obstacle, and which values."""
+
+
 @record(frozen=True, slots=True, eq=False)
 class Situation:
     """All that is known when a control step decides. path, pose and scene.robot_pose are in one frame.

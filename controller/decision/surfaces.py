@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import TYPICAL_DEPTH_NOISE, DepthNoise
-from controller.decision.bodies import Bodies, SceneError
+from controller.decision.bodies import Bodies
+from controller.decision.situation import SceneError
 from hal.compiled import compiled, inlined
 from hal.records import record
 from hal.types import CameraMount, FloatArray, PlanarPose

@@ -44,18 +44,7 @@ def unseen_or_approaching(
     the noise. A body is in neither mask if it was tracked for MIN_TRACKED_S or less, or was never wider than
     MIN_MOVER_HALF_WIDTH_M. widest_half_m (N,): half of the greatest width that each was seen with.
     """
-    out, comes = _unseen_or_approaching(
-        bodies.moving,
-        bodies.tracked_s,
-        bodies.unseen_s,
-        widest_half_m,
-        bodies.xy_m,
-        bodies.measured_mps,
-        bodies.covariance,
-        pose.x_m,
-        pose.y_m,
-        pose.heading_rad,
-    )
+    out, comes = _unseen_or_approaching(bodies, widest_half_m, pose)
     return out, comes
 
 
@@ -113,34 +102,22 @@ def velocities_agree(bodies: Bodies, seen: Bodies) -> BoolArray:
     return np.asarray(same & (seen.tracked_s > MIN_TRACKED_S))
 
 
-@compiled(
-    "boolean[:], float64[:], float64[:], float64[:], float64[:, :], float64[:, :], float64[:, :, :],"
-    "float64, float64, float64"
-)
-def _unseen_or_approaching(
-    moving: BoolArray,
-    tracked_s: FloatArray,
-    unseen_s: FloatArray,
-    widest_half_m: FloatArray,
-    xy_m: FloatArray,
-    measured_mps: FloatArray,
-    covariance: FloatArray,
-    x_m: float,
-    y_m: float,
-    heading_rad: float,
-) -> BoolArray:
-    cos, sin = math.cos(heading_rad), math.sin(heading_rad)
-    answers = np.zeros((2, len(moving)), np.bool_)
+@compiled(Bodies, "float64[:]", PlanarPose)
+def _unseen_or_approaching(bodies: Bodies, widest_half_m: FloatArray, pose: PlanarPose) -> BoolArray:
+    """(2, N) the masks of unseen_or_approaching()."""
+    cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
+    answers = np.zeros((2, len(bodies.moving)), np.bool_)
     out, comes = answers
-    for k in range(len(moving)):
+    for k in range(len(bodies.moving)):
         # tracked_s and not age_s: the velocity of a new track was hardly measured, however long something
         # has stood there.
-        if moving[k] or tracked_s[k] <= MIN_TRACKED_S or widest_half_m[k] <= MIN_MOVER_HALF_WIDTH_M:
+        hardly_tracked = bodies.tracked_s[k] <= MIN_TRACKED_S
+        if bodies.moving[k] or hardly_tracked or widest_half_m[k] <= MIN_MOVER_HALF_WIDTH_M:
             continue
-        out[k] = unseen_s[k] > 0.0
-        left_m = (xy_m[k, 1] - y_m) * cos - (xy_m[k, 0] - x_m) * sin
-        left_mps = measured_mps[k, 1] * cos - measured_mps[k, 0] * sin
-        spread = covariance[k]
+        out[k] = bodies.unseen_s[k] > 0.0
+        left_m = (bodies.xy_m[k, 1] - pose.y_m) * cos - (bodies.xy_m[k, 0] - pose.x_m) * sin
+        left_mps = bodies.measured_mps[k, 1] * cos - bodies.measured_mps[k, 0] * sin
+        spread = bodies.covariance[k]
         variance = (spread[0, 0] * sin - (spread[0, 1] + spread[1, 0]) * cos) * sin + spread[1, 1] * cos * cos
         clear_mps = max(_APPROACH_MIN_SIGMAS * math.sqrt(variance), _APPROACH_MIN_MPS)
         comes[k] = not out[k] and -np.sign(left_m) * left_mps > clear_mps

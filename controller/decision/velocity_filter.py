@@ -57,16 +57,7 @@ class SteadyVelocities:
             self._ids = self._ids[:0]
             return seen
         moving_s, velocity, variance, innovation = _averaged(
-            seen.ids,
-            moving,
-            seen.tracked_s,
-            seen.velocity_mps,
-            seen.covariance,
-            self._ids,
-            self._moving_s,
-            self._velocity,
-            self._variance,
-            dt_s,
+            seen, self._ids, self._moving_s, self._velocity, self._variance, dt_s
         )
         self._ids, self._moving_s, self._velocity, self._variance = (
             seen.ids,
@@ -92,39 +83,32 @@ def _missing_to_walking(velocity_mps: FloatArray) -> FloatArray:
     return missing
 
 
-@compiled(
-    "int64[:], boolean[:], float64[:], float64[:, :], float64[:, :, :],"
-    "int64[:], float64[:], float64[:, :], float64[:, :], float64"
-)
+@compiled(Bodies, "int64[:], float64[:], float64[:, :], float64[:, :], float64")
 def _averaged(
-    ids: NDArray[np.int64],
-    moving: NDArray[np.bool_],
-    tracked_s: FloatArray,
-    measured_mps: FloatArray,
-    covariance: FloatArray,
+    seen: Bodies,
     before_ids: NDArray[np.int64],
     before_moving_s: FloatArray,
     before_mps: FloatArray,
     before_variance: FloatArray,
     dt_s: float,
 ) -> FloatArray:
-    """(3, N, 2) velocity, its variance, and the innovation of N bodies.
+    """(4, N, 2) for how long N bodies have moved, velocity, its variance, and the innovation.
 
-    before_ids, moved (M,), before_mps and before_variance (M, 2): the bodies of the last scene. A body that
-    did not move then starts with its measurement.
+    seen: with measured velocities. before_ids, before_moving_s (M,), before_mps and before_variance (M, 2):
+    the bodies of the last scene. A body that did not move then starts with its measurement.
     """
-    result = np.zeros((4, *measured_mps.shape))
+    result = np.zeros((4, *seen.velocity_mps.shape))
     moving_s, velocity, variance, innovation = result
     correlated = max(_CORRELATED_S / dt_s, 1.0)
-    for k in range(len(ids)):
+    for k in range(len(seen.ids)):
         before = -1
         for m in range(len(before_ids)):
-            if moving[k] and before_moving_s[m] > 0.0 and ids[k] == before_ids[m]:
+            if seen.moving[k] and before_moving_s[m] > 0.0 and seen.ids[k] == before_ids[m]:
                 before = m
-        if moving[k]:
+        if seen.moving[k]:
             moving_s[k] = dt_s if before < 0 else before_moving_s[before] + dt_s
         for axis in range(2):
-            measured, spread = measured_mps[k, axis], covariance[k, axis, axis]
+            measured, spread = seen.velocity_mps[k, axis], seen.covariance[k, axis, axis]
             velocity[k, axis], variance[k, axis] = measured, spread
             if before < 0:
                 continue
@@ -135,7 +119,7 @@ def _averaged(
             differs = measured - average
             beyond_noise = max(abs(differs) - _NOISE_SIGMAS * math.sqrt(spread), 0.0)
             innovation[k, axis] = _SURPRISE_GAIN * math.copysign(beyond_noise, differs)
-        if 0.0 < moving_s[k, 0] < min(_SETTING_OFF_S, tracked_s[k] - _STOOD_S):
+        if 0.0 < moving_s[k, 0] < min(_SETTING_OFF_S, seen.tracked_s[k] - _STOOD_S):
             missing_mps = _missing_to_walking(velocity[k : k + 1])[0]
             for axis in range(2):
                 if abs(missing_mps[axis]) > abs(innovation[k, axis]):

@@ -57,7 +57,7 @@ def beyond_edges(bodies: Bodies, near_face_m: FloatArray, height_m: float, edges
 
     near_face_m (N,): distance of their near faces ahead of the camera. height_m: of the camera.
     """
-    return _beyond_edges(near_face_m, bodies.bottom_m, bodies.top_m, height_m, edges.near_m, edges.up_tan)
+    return _beyond_edges(bodies, near_face_m, height_m, edges)
 
 
 def out_of_view(
@@ -73,25 +73,7 @@ def out_of_view(
     pose: of the robot that carries the camera. A centre up to tolerance_m inside the side edge counts as
     beside the view; of a mover, tolerance_mps more for each second since it was last seen.
     """
-    return _out_of_view(
-        bodies.xy_m,
-        bodies.half_view_m,
-        bodies.bottom_m,
-        bodies.top_m,
-        bodies.moving,
-        bodies.unseen_s,
-        pose.x_m,
-        pose.y_m,
-        pose.heading_rad,
-        mount.forward_m,
-        mount.left_m,
-        mount.height_m,
-        edges.edge_tan,
-        edges.near_m,
-        edges.up_tan,
-        tolerance_m,
-        tolerance_mps,
-    )
+    return _out_of_view(bodies, pose, mount, edges, tolerance_m, tolerance_mps)
 
 
 def may_be_above_view_within_m(top_m: float, height_m: float, up_tan: float) -> float:
@@ -106,9 +88,7 @@ def visible_from_m(bodies: Bodies, side_m: FloatArray, height_m: float, edges: V
     There its centre is within the side edges, its top is above the lower edge and its bottom is below the
     upper edge. side_m (N,): sideways distance of its centre from the camera's axis. height_m: of the camera.
     """
-    return _visible_from_m(
-        bodies.top_m, bodies.bottom_m, side_m, height_m, edges.edge_tan, edges.near_m, edges.up_tan
-    )
+    return _visible_from_m(bodies, side_m, height_m, edges)
 
 
 @inlined
@@ -124,77 +104,52 @@ def _highest_seen_m(ahead_m: float, height_m: float, up_tan: float) -> float:
 
 
 @inlined
-def _beyond(
-    near_face_m: float, bottom_m: float, top_m: float, height_m: float, near_m: float, up_tan: float
-) -> bool:
-    below = near_face_m < near_m and top_m < _lowest_seen_m(near_face_m, height_m, near_m) + UNCERTAIN_M
-    return below or bottom_m > _highest_seen_m(near_face_m, height_m, up_tan) - UNCERTAIN_M
+def _beyond(near_face_m: float, bottom_m: float, top_m: float, height_m: float, edges: ViewEdges) -> bool:
+    """As beyond_edges(), for one body."""
+    lowest_m = _lowest_seen_m(near_face_m, height_m, edges.near_m)
+    below = near_face_m < edges.near_m and top_m < lowest_m + UNCERTAIN_M
+    return below or bottom_m > _highest_seen_m(near_face_m, height_m, edges.up_tan) - UNCERTAIN_M
 
 
-@compiled("float64[:], float64[:], float64[:], float64, float64, float64")
-def _beyond_edges(
-    near_face_m: FloatArray,
-    bottom_m: FloatArray,
-    top_m: FloatArray,
-    height_m: float,
-    near_m: float,
-    up_tan: float,
-) -> BoolArray:
+@compiled(Bodies, "float64[:], float64", ViewEdges)
+def _beyond_edges(bodies: Bodies, near_face_m: FloatArray, height_m: float, edges: ViewEdges) -> BoolArray:
+    """As beyond_edges()."""
     beyond = np.empty(len(near_face_m), np.bool_)
     for k in range(len(near_face_m)):
-        beyond[k] = _beyond(near_face_m[k], bottom_m[k], top_m[k], height_m, near_m, up_tan)
+        beyond[k] = _beyond(near_face_m[k], bodies.bottom_m[k], bodies.top_m[k], height_m, edges)
     return beyond
 
 
-@compiled(
-    "float64[:, :], float64[:], float64[:], float64[:], boolean[:], float64[:], float64, float64, float64,"
-    "float64, float64, float64, float64, float64, float64, float64, float64"
-)
+@compiled(Bodies, PlanarPose, CameraMount, ViewEdges, "float64, float64")
 def _out_of_view(
-    xy_m: FloatArray,
-    half_view_m: FloatArray,
-    bottom_m: FloatArray,
-    top_m: FloatArray,
-    moving: BoolArray,
-    unseen_s: FloatArray,
-    x_m: float,
-    y_m: float,
-    heading_rad: float,
-    forward_m: float,
-    left_m: float,
-    height_m: float,
-    edge_tan: float,
-    near_m: float,
-    up_tan: float,
+    bodies: Bodies,
+    pose: PlanarPose,
+    mount: CameraMount,
+    edges: ViewEdges,
     tolerance_m: float,
     tolerance_mps: float,
 ) -> BoolArray:
-    cos, sin = math.cos(heading_rad), math.sin(heading_rad)
-    out = np.empty(len(xy_m), np.bool_)
-    for k in range(len(xy_m)):
-        dx, dy = xy_m[k, 0] - x_m, xy_m[k, 1] - y_m
-        ahead, left = dx * cos + dy * sin - forward_m, dy * cos - dx * sin - left_m
-        within_m = tolerance_m + (tolerance_mps * unseen_s[k] if moving[k] else 0.0)
-        beside = abs(left) > edge_tan * max(ahead, 0.0) - within_m
-        beyond = _beyond(ahead - half_view_m[k], bottom_m[k], top_m[k], height_m, near_m, up_tan)
+    """As out_of_view()."""
+    cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
+    out = np.empty(len(bodies.xy_m), np.bool_)
+    for k in range(len(out)):
+        dx, dy = bodies.xy_m[k, 0] - pose.x_m, bodies.xy_m[k, 1] - pose.y_m
+        ahead, left = dx * cos + dy * sin - mount.forward_m, dy * cos - dx * sin - mount.left_m
+        within_m = tolerance_m + (tolerance_mps * bodies.unseen_s[k] if bodies.moving[k] else 0.0)
+        beside = abs(left) > edges.edge_tan * max(ahead, 0.0) - within_m
+        near_face_m = ahead - bodies.half_view_m[k]
+        beyond = _beyond(near_face_m, bodies.bottom_m[k], bodies.top_m[k], mount.height_m, edges)
         out[k] = (beside or beyond) and ahead > -_BEHIND_M
     return out
 
 
-@compiled("float64[:], float64[:], float64[:], float64, float64, float64, float64")
-def _visible_from_m(
-    top_m: FloatArray,
-    bottom_m: FloatArray,
-    side_m: FloatArray,
-    height_m: float,
-    edge_tan: float,
-    near_m: float,
-    up_tan: float,
-) -> FloatArray:
-    visible = np.empty(len(top_m))
-    for k in range(len(top_m)):
-        lowest = min(max(1.0 - (top_m[k] - UNCERTAIN_M) / height_m, 0.0), 1.0)
-        rise_m = max(bottom_m[k] + UNCERTAIN_M - height_m, 0.0)
-        beside = abs(side_m[k]) / max(edge_tan, MIN_TAN)
-        visible[k] = max(beside, near_m * lowest, rise_m / max(up_tan, MIN_TAN))
+@compiled(Bodies, "float64[:], float64", ViewEdges)
+def _visible_from_m(bodies: Bodies, side_m: FloatArray, height_m: float, edges: ViewEdges) -> FloatArray:
+    """As visible_from_m()."""
+    visible = np.empty(len(side_m))
+    for k in range(len(side_m)):
+        lowest = min(max(1.0 - (bodies.top_m[k] - UNCERTAIN_M) / height_m, 0.0), 1.0)
+        rise_m = max(bodies.bottom_m[k] + UNCERTAIN_M - height_m, 0.0)
+        beside = abs(side_m[k]) / max(edges.edge_tan, MIN_TAN)
+        visible[k] = max(beside, edges.near_m * lowest, rise_m / max(edges.up_tan, MIN_TAN))
     return visible

@@ -1,7 +1,7 @@
 """What the decision knows of the way ahead: the last good scene, and the bodies out of view since then.
 
-For each new scene, WorldModel turns the obstacles into boxes (controller/decision/bodies.py), averages their
-velocities (controller/decision/velocity_filter.py), adds bodies that have left the view
+For each new scene, WorldModel turns the obstacles into boxes (controller/decision/obstacle_boxes.py),
+averages their velocities (controller/decision/velocity_filter.py), adds bodies that have left the view
 (controller/decision/out_of_view.py), and notes free floor and unexplained surfaces along the path
 (controller/decision/sight.py). In each control step it says whether the camera can be relied on (the field
 fault). controller/decision/speed_limits.py turns what is known into speed limits.
@@ -19,12 +19,14 @@ from numpy.typing import NDArray
 from config.decision import DecisionConfig
 from config.perception import TYPICAL_DEPTH_NOISE, DepthNoise
 from config.robot import Robot
-from controller.decision.bodies import Bodies, SceneError, bodies_of, no_bodies
+from controller.decision.bodies import Bodies, no_bodies
 from controller.decision.corridor import Corridor
 from controller.decision.lens_cover import LensCover
 from controller.decision.limits import STANDING_MPS
+from controller.decision.obstacle_boxes import bodies_of
 from controller.decision.out_of_view import OutOfView
 from controller.decision.sight import Sight
+from controller.decision.situation import SceneError
 from controller.decision.surfaces import NO_SURFACES, check_scan, surfaces_of
 from controller.decision.unseen_motion import MIN_TRACKED_S
 from controller.decision.velocity_filter import SteadyVelocities

@@ -5,7 +5,8 @@ The files in the order in which they come into play:
 * evaluate.py - the command: simulated set, recordings, or both, into one report folder
 * sequences.py - which simulated sequences there are, and which of them the detector may be tuned on
 * scripted_drive.py - the robot's motion, its odometry, the camera mount
-* scenes.py - the movers and the clutter of a sequence
+* scenes.py - the movers of a sequence, in one of the places
+* places.py - hall, aisle and workshop: the room, what is fixed in it, and clutter
 * campaign.py - runs all sequences on several processes
 * run_sequence.py - runs all methods on one sequence; renders each frame once
 * simulate.py - the frames of a sequence: image, odometry, truth

@@ -15,13 +15,13 @@ from config.governor import GovernorConfig
 from config.perception import TYPICAL_DEPTH_NOISE, DepthNoise
 from config.robot import Robot
 from controller.answer import ANSWERS, Answer
-from controller.decision.bodies import SceneError, bodies_of
 from controller.decision.camera_limits import condition_limit
 from controller.decision.decide import DecisionMaker
 from controller.decision.decision import Action, Decision, Reason
 from controller.decision.lens_cover import COVERED
 from controller.decision.limits import Limit, Motion, speed_to_decide_by
-from controller.decision.situation import Situation
+from controller.decision.obstacle_boxes import bodies_of
+from controller.decision.situation import SceneError, Situation
 from controller.decision.surfaces import check_scan
 from controller.governor.arc_ahead import ArcAhead
 from controller.governor.arcs import Kind, Wish, corner_m, driveable, understand, why_stop

@@ -198,7 +198,7 @@ def test_whoever_does_not_keep_up_gets_the_newest_and_no_queue(live: Case) -> No
         assert late.sequence >= frames[1].sequence + 3, "the gap shows what was left out"
 
 
-def test_what_is_closed_gives_nothing_until_it_is_opened_again(case: Case) -> None:
+def test_closed_source_refuses_reads_until_it_is_opened_again(case: Case) -> None:
     with case.source:
         case.source.read(LONG_S)
     with pytest.raises(DeviceRefused):

@@ -52,7 +52,7 @@ near = st.floats(-1.0, 2.0)
     ),
     st.integers(0, 10**9),
 )
-def test_what_passes_is_within_every_bound(last: Setpoint, setpoint: Setpoint, now_ns: int) -> None:
+def test_setpoint_that_passes_is_within_every_bound(last: Setpoint, setpoint: Setpoint, now_ns: int) -> None:
     if objection(setpoint, last, LIMITS, now_ns):
         return
     assert -1e-6 <= setpoint.v_mps <= 1.5 + 1e-6

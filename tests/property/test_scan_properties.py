@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from config.robot import Robot
-from controller.decision.bodies import SceneError
+from controller.decision.situation import SceneError
 from controller.decision.surfaces import check_scan
 from controller.shape import SpeedShaper
 from hal.types import FloatArray
@@ -88,7 +88,7 @@ distances = st.floats(0.0, 100.0)
     st.floats(0.0, NEVER_M),
     st.floats(-2.0, 2.0) | st.just(math.inf),
 )
-def test_what_a_camera_may_tell_is_not_refused(
+def test_possible_scan_is_not_refused(
     bands: list[tuple[float, float]],
     half_width_tan: float,
     first_tan: float,

@@ -13,7 +13,7 @@ from hal.compiled import compiled
 from hal.types import FloatArray
 from vision.bodies.tracks import Tracks
 from vision.depth.connected import IntGrid
-from vision.depth.depth_grid import FloatGrid, nearest_cell
+from vision.depth.depth_grid import DepthGrid, nearest_cell
 from vision.depth.depth_noise import depth_sigma_of
 from vision.detection import Detection
 from vision.motion.candidates import long_static
@@ -64,57 +64,54 @@ def adopt(
     labels (h, w): track index + 1 of each cell. owner (N,): ids of the tracks in the frame before. A fragment
     that has been static for a while, on the floor or a wall, is not given to a mover that passes by.
     """
-    grid = detection.grid
     if len(tracks) == 0 or len(owner) == 0:
         return np.full(len(owner), -1, np.int64)
     age_s: FloatArray = np.multiply(detection.age_frames, detection.dt_s, dtype=np.float64)
     return _adopted(
         detection.ends_px,
         detection.near_m,
-        grid.depth_m,
+        detection.grid,
         labels,
-        grid.offset_px,
-        grid.step_px,
-        noise.floor_m,
-        noise.quadratic_per_m,
-        tracks.ids,
-        tracks.moving,
+        tracks,
         long_static(detection.motion, age_s),
         owner,
+        noise,
     )
 
 
 @compiled(
-    "float32[:, :, :], float32[:, :], float32[:, ::1], int32[:, ::1], float64, float64, float64, float64,"
-    "int64[::1], boolean[::1], boolean[:], int64[::1]"
+    "float32[:, :, :], float32[:, :]",
+    DepthGrid,
+    "int32[:, ::1]",
+    Tracks,
+    "boolean[:], int64[::1]",
+    DepthNoise,
 )
 def _adopted(
     ends_px: NDArray[np.float32],
     near_m: NDArray[np.float32],
-    depth_m: FloatGrid,
+    grid: DepthGrid,
     labels: IntGrid,
-    offset_px: float,
-    step_px: float,
-    floor_m: float,
-    quadratic_per_m: float,
-    ids: NDArray[np.int64],
-    moving: NDArray[np.bool_],
+    tracks: Tracks,
     is_long_static: NDArray[np.bool_],
     owner: NDArray[np.int64],
+    noise: DepthNoise,
 ) -> NDArray[np.int64]:
     """As adopt. is_long_static (N,): fragments that have been static for a while."""
     height, width = labels.shape
+    offset_px, step_px = grid.offset_px, grid.step_px
     result = np.full(len(ends_px), -1, np.int64)
     for k in range(len(ends_px)):
         own_m = float(np.fmin(near_m[k, 0], near_m[k, 1]))
         u, v = float(ends_px[k, 0, 0]), float(ends_px[k, 0, 1])
         across, down = float(ends_px[k, 1, 0]) - u, float(ends_px[k, 1, 1]) - v
-        sigma_m = depth_sigma_of(own_m, floor_m, quadratic_per_m)
+        sigma_m = depth_sigma_of(own_m, noise.floor_m, noise.quadratic_per_m)
         track, least, on_it = -1, np.inf, False
         for i in range(len(_ALONG)):
             row = nearest_cell(v + down * _ALONG[i] - _ABOVE_PX[i], offset_px, step_px, height)
             column = nearest_cell(u + across * _ALONG[i] + _BESIDE_PX[i], offset_px, step_px, width)
-            there_m, gap_m = depth_m[row, column], abs(depth_m[row, column] - own_m)
+            there_m = grid.depth_m[row, column]
+            gap_m = abs(there_m - own_m)
             if labels[row, column] == 0 or not gap_m <= _MIN_GATE_M + 2.0 * sigma_m:
                 continue
             on_it = on_it or i < _ON_IT
@@ -123,6 +120,6 @@ def _adopted(
             off = max(gap_m - _SAME_DEPTH_M - sigma_m, 0.0) + np.float32(_NEARER) * there_m
             if off < least:
                 track, least = labels[row, column] - 1, off
-        if on_it and not (is_long_static[k] and moving[track] and ids[track] != owner[k]):
-            result[k] = ids[track]
+        if on_it and not (is_long_static[k] and tracks.moving[track] and tracks.ids[track] != owner[k]):
+            result[k] = tracks.ids[track]
     return result

@@ -137,34 +137,20 @@ class ViewMemory:
         """(h, w) cells of mask nearer than the surface in memory; and (h, w) those at it, within noise."""
         sigma_1pm = math.sqrt(2.0) * _CELL_NOISE_OVER_TIME * self._noise.quadratic_per_m
         return _compared(
-            grid.depth_m,
-            grid.x,
-            grid.y,
-            mask,
-            pose.rotation,
-            pose.translation_m,
-            memory.pose.rotation,
-            memory.pose.translation_m,
-            memory.nearest_inverse,
-            np.float32(_SIGMAS) * np.float32(sigma_1pm),
+            grid, mask, pose, memory.pose, memory.nearest_inverse, np.float32(_SIGMAS) * np.float32(sigma_1pm)
         )
 
 
 @inlined
 def _project_row(
-    depth_m: FloatGrid,
-    ray_x: FloatGrid,
-    ray_y: FloatGrid,
-    row: int,
-    rows: tuple[Row, Row, Row],
-    cell: IntGrid,
-    inverse: FloatGrid,
+    grid: DepthGrid, row: int, rows: tuple[Row, Row, Row], cell: IntGrid, inverse: FloatGrid
 ) -> None:
     """Project the cells of one row into the other view.
 
     Puts the flat cell of that view, -1 outside of it, into cell (w,) and the inverse depth there into inverse
     (w,). There is no branch, so that the processor can do several at once.
     """
+    ray_x, ray_y, depth_m = grid.x, grid.y, grid.depth_m
     columns, width, height = np.int32(len(ray_x)), np.float32(len(ray_x)), np.float32(len(ray_y))
     left, top, zero = ray_x[0], ray_y[0], np.float32(0.0)
     per_column, per_row = np.float32(1.0) / (ray_x[1] - left), np.float32(1.0) / (ray_y[1] - top)
@@ -180,35 +166,28 @@ def _project_row(
         cell[j] = np.int32(v) * columns + np.int32(u) if inside else np.int32(-1)
 
 
-@compiled(
-    "float32[:, ::1], float32[::1], float32[::1], boolean[:, ::1], float64[:, :], float64[:], float64[:, :],"
-    "float64[:], float32[:, ::1], float32"
-)
+@compiled(DepthGrid, "boolean[:, ::1]", Pose, Pose, "float32[:, ::1], float32")
 def _compared(
-    depth_m: FloatGrid,
-    ray_x: FloatGrid,
-    ray_y: FloatGrid,
+    grid: DepthGrid,
     mask: BoolGrid,
-    rotation: FloatArray,
-    origin_m: FloatArray,
-    old_rotation: FloatArray,
-    old_origin_m: FloatArray,
+    pose: Pose,
+    old_pose: Pose,
     seen_inverse: FloatGrid,
     noise_1pm: np.float32,
 ) -> tuple[BoolGrid, BoolGrid]:
-    """As _compare. rotation, origin_m: pose of the camera now; old_...: when seen_inverse (h, w) was seen."""
-    height, width = depth_m.shape
+    """As _compare. pose: of the camera now; old_pose: when seen_inverse (h, w) was seen."""
+    height, width = mask.shape
     nearer, same = np.zeros((height, width), np.bool_), np.zeros((height, width), np.bool_)
     cell, inverse, seen = np.empty(width, np.int32), np.empty(width, np.float32), seen_inverse.ravel()
     rows = (
-        relative_row(old_rotation, old_origin_m, rotation, origin_m, 0),
-        relative_row(old_rotation, old_origin_m, rotation, origin_m, 1),
-        relative_row(old_rotation, old_origin_m, rotation, origin_m, 2),
+        relative_row(old_pose, pose, 0),
+        relative_row(old_pose, pose, 1),
+        relative_row(old_pose, pose, 2),
     )
     for i in range(height):
         if not mask[i].any():
             continue
-        _project_row(depth_m, ray_x, ray_y, i, rows, cell, inverse)
+        _project_row(grid, i, rows, cell, inverse)
         for j in range(width):
             if mask[i, j] and cell[j] >= 0:
                 ahead = inverse[j] - seen[cell[j]]

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from hal.compiled import compiled
 from vision.bodies.tracks import Tracks
-from vision.depth import regions
+from vision.depth import occlusion
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import DepthGrid, FloatGrid
 from vision.depth.regions import Regions
@@ -54,7 +54,7 @@ def start_tracks(
         )
         if swings_in.any():
             swings_in &= reaching_down(grid, parts, len(winner), _PERSON_M)
-        large &= ~overhead | swings_in | regions.hidden_below(grid, parts, measured)
+        large &= ~overhead | swings_in | occlusion.hidden_below(grid, parts, measured)
     born = large.nonzero()[0]
     if len(born) == 0:
         return winner

@@ -20,7 +20,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from config.perception import PerceptionConfig
+from config.perception import DepthNoise, PerceptionConfig
 from hal.compiled import compiled
 from hal.types import FloatArray
 from vision.bodies.arrivals import ARRIVED_UP_TO_S
@@ -69,15 +69,7 @@ def carve(
     suspicious = candidates.moving_candidates(detection.motion, detection.age_frames).nonzero()[0]
     if len(suspicious) == 0 and not arrived.any():
         return labels
-    searched, overgrown = _may_hide_mover(
-        tracks.mover,
-        tracks.moving,
-        tracks.surely_static & (tracks.no_evidence_s >= ARRIVED_UP_TO_S),
-        measured.position_m,
-        measured.extent_m,
-        config.depth_noise.floor_m,
-        config.depth_noise.quadratic_per_m,
-    )
+    searched, overgrown = _may_hide_mover(tracks, measured, tracks.mover, config.depth_noise)
     asked = searched | overgrown
     if not asked.any():
         return labels
@@ -111,27 +103,22 @@ def _large_components(grid: DepthGrid, cells: BoolGrid) -> tuple[IntGrid, int]:
     return number.take(parts), len(large)
 
 
-@compiled("boolean[:], boolean[:], boolean[:], float64[:, :], float64[:, :], float64, float64")
+@compiled(Tracks, Regions, "boolean[:]", DepthNoise)
 def _may_hide_mover(
-    mover: NDArray[np.bool_],
-    moving: NDArray[np.bool_],
-    calm: NDArray[np.bool_],
-    position_m: FloatArray,
-    extent_m: FloatArray,
-    floor_m: float,
-    quadratic_per_m: float,
+    tracks: Tracks, measured: Regions, mover: NDArray[np.bool_], noise: DepthNoise
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """(T,) static tracks that may hide a mover; and (T,) movers that have grown larger than any body."""
     searched, overgrown = np.zeros(len(mover), np.bool_), np.zeros(len(mover), np.bool_)
     for t in range(len(mover)):
-        depth_m = position_m[t, 2]
-        deepest_m = _COMPACT_M + 2.0 * depth_sigma_of(depth_m, floor_m, quadratic_per_m)
-        compact = extent_m[t, 0] <= _COMPACT_M and extent_m[t, 2] <= deepest_m
+        width_m, depth_m = measured.extent_m[t, 0], measured.position_m[t, 2]
+        sigma_m = depth_sigma_of(depth_m, noise.floor_m, noise.quadratic_per_m)
+        compact = width_m <= _COMPACT_M and measured.extent_m[t, 2] <= _COMPACT_M + 2.0 * sigma_m
+        calm = tracks.surely_static[t] and tracks.no_evidence_s[t] >= ARRIVED_UP_TO_S
         # If the fragments of something wider than a body stand still while part of it arrives, somebody
         # touches it.
-        touched = calm[t] and extent_m[t, 0] > SINGLE_WIDTH_M
+        touched = calm and width_m > SINGLE_WIDTH_M
         searched[t] = not mover[t] and (not compact or touched)
-        overgrown[t] = moving[t] and not compact
+        overgrown[t] = tracks.moving[t] and not compact
     return searched, overgrown
 
 

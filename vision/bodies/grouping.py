@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.compiled import compiled
-from hal.types import FloatArray
+from hal.types import Matrix, Vector
 from vision.bodies.boxes import LOAD_GAP_M, MIN_SAMPLES, SEEN_THROUGH_GAP_M, cells_between, relations
 from vision.bodies.division import NEARER_INVERSE
 from vision.depth.depth_grid import DepthGrid
@@ -43,10 +43,10 @@ class ExpectedBodies:
     sigma_m: standard deviation of measured depth there, (T,).
     """
 
-    centre_m: FloatArray
-    extent_m: FloatArray
-    box_m: FloatArray
-    sigma_m: FloatArray
+    centre_m: Matrix
+    extent_m: Matrix
+    box_m: Matrix
+    sigma_m: Vector
 
 
 def expected_in(
@@ -66,43 +66,26 @@ def expected_in(
     result = np.zeros((len(parts.cells), len(mover)), np.bool_)
     if not mover.any():
         return result
-    result, main = _within_expected_box(
-        parts.position_m,
-        parts.cells,
-        winner,
-        votes,
-        bodies.centre_m,
-        bodies.extent_m,
-        bodies.box_m,
-        bodies.sigma_m,
-        mover,
-    )
+    result, main = _within_expected_box(parts, bodies, winner, votes, mover)
     part, track = np.nonzero(result)
     if len(part):
         result[part, track] = something_nearer_between(grid, parts, part, main[track])
     return result
 
 
-@compiled(
-    "float64[:, :], int64[:], int32[::1], int64[:], float64[:, :], float64[:, :], float64[:, :],"
-    "float64[::1], boolean[::1]"
-)
+@compiled(Regions, ExpectedBodies, "int32[::1], int64[:], boolean[::1]")
 def _within_expected_box(
-    position_m: FloatArray,
-    cells: NDArray[np.intp],
+    parts: Regions,
+    bodies: ExpectedBodies,
     winner: NDArray[np.int32],
     votes: NDArray[np.intp],
-    centre_m: FloatArray,
-    extent_m: FloatArray,
-    box_m: FloatArray,
-    sigma_m: FloatArray,
     mover: NDArray[np.bool_],
 ) -> tuple[NDArray[np.bool_], NDArray[np.intp]]:
     """(P, T) parts within the box and depth of a mover; and (T,) its main part, the one with the most votes.
 
     A mover without a main part (-1) gets no others.
     """
-    result, main = np.zeros((len(cells), len(mover)), np.bool_), np.full(len(mover), -1, np.intp)
+    result, main = np.zeros((len(parts.cells), len(mover)), np.bool_), np.full(len(mover), -1, np.intp)
     for p in range(len(winner)):
         t = winner[p] - 1
         if 0 <= t < len(mover) and (main[t] < 0 or votes[p] >= votes[main[t]]):
@@ -110,16 +93,17 @@ def _within_expected_box(
     for t in range(len(mover)):
         if not mover[t] or main[t] < 0:
             continue
-        half_x, half_y = 0.5 * extent_m[t, 0], 0.5 * extent_m[t, 1]
-        room_x = max(box_m[t, 2] - box_m[t, 0] - half_x, half_x) + _CLOSE_M
-        room_y = max(box_m[t, 3] - box_m[t, 1] - half_y, half_y) + _CLOSE_M
-        room_z = _SAME_DEPTH_M + sigma_m[t]
-        for p in range(len(cells)):
+        left_m, upper_m, right_m, lower_m = bodies.box_m[t]
+        half_x, half_y = 0.5 * bodies.extent_m[t, 0], 0.5 * bodies.extent_m[t, 1]
+        room_x = max(right_m - left_m - half_x, half_x) + _CLOSE_M
+        room_y = max(lower_m - upper_m - half_y, half_y) + _CLOSE_M
+        room_z = _SAME_DEPTH_M + bodies.sigma_m[t]
+        for p in range(len(parts.cells)):
             result[p, t] = (
-                cells[p] > 0
-                and abs(position_m[p, 0] - centre_m[t, 0]) <= room_x
-                and abs(position_m[p, 1] - centre_m[t, 1]) <= room_y
-                and abs(position_m[p, 2] - centre_m[t, 2]) <= room_z
+                parts.cells[p] > 0
+                and abs(parts.position_m[p, 0] - bodies.centre_m[t, 0]) <= room_x
+                and abs(parts.position_m[p, 1] - bodies.centre_m[t, 1]) <= room_y
+                and abs(parts.position_m[p, 2] - bodies.centre_m[t, 2]) <= room_z
             )
     return result, main
 

@@ -42,7 +42,7 @@ from numpy.typing import NDArray
 from config.perception import MotionSettings
 from hal.compiled import compiled
 from hal.types import FloatArray
-from vision.bodies.proof import prove
+from vision.bodies.proof import Proof, prove
 from vision.motion.motion_evidence import MotionEvidence
 
 # Time in which the weakest proof raises the score by 1: two frames at 30 a second. With three frames the
@@ -92,14 +92,9 @@ def judge(
     """
     proof = prove(seen, moving, IMPLAUSIBLE_SPEED_FACTOR * settings.max_speed_mps, dt_s, settings)
     new_evidence, new_moving, confidence = _updated_scores(
+        proof,
         evidence,
         moving,
-        proof.moves,
-        proof.strength,
-        proof.surely_static,
-        proof.over,
-        proof.goes_on,
-        proof.squared_sigmas,
         seen.borne_out,
         dt_s / (_RISE_S if seen.reckoned else _RISE_ALONE_S),
         dt_s,
@@ -113,24 +108,16 @@ def judge(
     )
 
 
-@compiled(
-    "float64[::1], boolean[::1], boolean[::1], float64[::1], boolean[::1], boolean[::1], boolean[::1],"
-    "float64[::1], float64, float64, float64"
-)
+@compiled(Proof, "float64[::1], boolean[::1], float64, float64, float64")
 def _updated_scores(
+    proof: Proof,
     evidence: FloatArray,
     moving: NDArray[np.bool_],
-    proven: NDArray[np.bool_],
-    strength: FloatArray,
-    surely_static: NDArray[np.bool_],
-    over: NDArray[np.bool_],
-    goes_on: NDArray[np.bool_],
-    squared_sigmas: FloatArray,
     borne_out: float,
     rise: float,
     dt_s: float,
 ) -> tuple[FloatArray, NDArray[np.bool_], FloatArray]:
-    """evidence, moving and confidence of Verdict after a frame with the fields of Proof.
+    """evidence, moving and confidence of Verdict after a frame with this proof.
 
     rise: how much the weakest proof raises the score, before it is multiplied by borne_out (0..1).
     """
@@ -140,13 +127,13 @@ def _updated_scores(
         np.empty(len(moving)),
     )
     for t in range(len(moving)):
-        if proven[t] and not surely_static[t]:
+        if proof.moves[t] and not proof.surely_static[t]:
             # A stronger proof raises the score faster.
-            pace = np.minimum(np.maximum(strength[t], 1.0), _FASTEST)
+            pace = np.minimum(np.maximum(proof.strength[t], 1.0), _FASTEST)
             change = borne_out * np.minimum(pace * rise, _MAX_RISE)
         else:
-            change = -dt_s / (_STOP_S if over[t] else _HOLD_S if goes_on[t] else _FALL_S)
+            change = -dt_s / (_STOP_S if proof.over[t] else _HOLD_S if proof.goes_on[t] else _FALL_S)
         score[t] = np.minimum(np.maximum(evidence[t] + change, 0.0), _MAX_EVIDENCE)
         now_moving[t] = score[t] > 0.0 if moving[t] else score[t] >= 1.0
-        confidence[t] = 1.0 - math.exp(-squared_sigmas[t] / _SURE_SQUARED_SIGMAS)
+        confidence[t] = 1.0 - math.exp(-proof.squared_sigmas[t] / _SURE_SQUARED_SIGMAS)
     return score, now_moving, confidence

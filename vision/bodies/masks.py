@@ -9,6 +9,7 @@ projected point. The predicted cells then vote to which track each part belongs 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from hal.compiled import compiled
 from hal.types import FloatArray, Pose
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import DepthGrid, FloatGrid
+from vision.numerics.pose_axes import inner_vector
 from vision.numerics.relative_pose import NEAREST_M, coordinate_m, relative_row
 
 # The gate on depth is the sum of both: as large as a jump in depth within one part may be (in 1/m), and how
@@ -35,8 +37,8 @@ class TrackSurfaces:
     pose: the camera in the fixed frame.
     """
 
-    points_m: FloatGrid
-    owner: NDArray[np.int32]
+    points_m: Annotated[FloatGrid, "float32[:, ::1]"]
+    owner: Annotated[NDArray[np.int32], "int32[::1]"]
     track_id: NDArray[np.int64]
     pose: Pose
 
@@ -81,59 +83,34 @@ def predict(
     index (T,): present index of each track in before, -1 if it has ended. shift_m (present tracks, 3):
     displacement of each track since then, in the fixed frame, as before.pose and pose are.
     """
-    return _predicted(
-        before.points_m,
-        before.owner,
-        index,
-        shift_m,
-        before.pose.rotation,
-        before.pose.translation_m,
-        pose.rotation,
-        pose.translation_m,
-        grid.inverse_depth,
-        grid.x,
-        grid.y,
-    )
+    return _predicted(before, index, shift_m, before.pose, pose, grid)
 
 
-@compiled(
-    "float32[:, ::1], int32[::1], int64[::1], float64[:, :], float64[:, :], float64[:], float64[:, :],"
-    "float64[:], float32[:, ::1], float32[::1], float32[::1]"
-)
+@compiled(TrackSurfaces, "int64[::1], float64[:, :]", Pose, Pose, DepthGrid)
 def _predicted(
-    points_m: FloatGrid,
-    owner: NDArray[np.int32],
+    before: TrackSurfaces,
     index: NDArray[np.intp],
     shift_m: FloatArray,
-    old_rotation: FloatArray,
-    old_origin_m: FloatArray,
-    rotation: FloatArray,
-    origin_m: FloatArray,
-    inverse_depth: FloatGrid,
-    ray_x: FloatGrid,
-    ray_y: FloatGrid,
+    old_pose: Pose,
+    pose: Pose,
+    grid: DepthGrid,
 ) -> IntGrid:
-    """As predict. rotation, origin_m: pose of the camera now; old_...: when the points were seen."""
-    height, width = inverse_depth.shape
+    """As predict. old_pose: of the camera when the points were seen; pose: now."""
+    height, width = grid.inverse_depth.shape
     result, nearest = np.zeros((height, width), np.int32), np.zeros((height, width), np.float32)
-    left, top = ray_x[0], ray_y[0]
-    per_column, per_row = np.float32(1.0) / (ray_x[1] - left), np.float32(1.0) / (ray_y[1] - top)
-    to_x = relative_row(rotation, origin_m, old_rotation, old_origin_m, 0)
-    to_y = relative_row(rotation, origin_m, old_rotation, old_origin_m, 1)
-    to_z = relative_row(rotation, origin_m, old_rotation, old_origin_m, 2)
+    left, top = grid.x[0], grid.y[0]
+    per_column, per_row = np.float32(1.0) / (grid.x[1] - left), np.float32(1.0) / (grid.y[1] - top)
+    to_x = relative_row(pose, old_pose, 0)
+    to_y = relative_row(pose, old_pose, 1)
+    to_z = relative_row(pose, old_pose, 2)
     displacement_m = np.zeros(shift_m.shape, np.float32)  # in the camera's axes now
     for track in range(len(shift_m)):
-        for i in range(3):
-            displacement_m[track, i] = (
-                shift_m[track, 0] * rotation[0, i]
-                + shift_m[track, 1] * rotation[1, i]
-                + shift_m[track, 2] * rotation[2, i]
-            )
-    for k in range(len(owner)):
-        track = index[owner[k]]
+        displacement_m[track] = inner_vector(pose, shift_m[track])
+    for k in range(len(before.owner)):
+        track = index[before.owner[k]]
         if track < 0:
             continue
-        x, y, z = points_m[0, k], points_m[1, k], points_m[2, k]
+        x, y, z = before.points_m[0, k], before.points_m[1, k], before.points_m[2, k]
         there_m = coordinate_m(to_z, x, y, z) + displacement_m[track, 2]
         if not there_m > NEAREST_M:
             continue
@@ -147,7 +124,7 @@ def _predicted(
         if not (0.0 <= column < width and 0.0 <= row < height):
             continue
         i, j = int(row), int(column)
-        measured = inverse_depth[i, j]
+        measured = grid.inverse_depth[i, j]
         gate = np.float32(_DEPTH_GATE_INVERSE) + np.float32(_DEPTH_GATE_M) * expected * expected
         if not (measured > 0 and abs(measured - expected) <= gate):
             continue

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from config.perception import MotionSettings
 from hal.compiled import compiled, inlined
-from hal.types import FloatArray
+from hal.types import Flags, FloatArray, Vector
 from vision.bodies.proof_rules import (
     ENDS_ACROSS,
     STANDING_SHARE,
@@ -30,7 +30,7 @@ from vision.bodies.proof_rules import (
     shown_across,
     stands_surely,
 )
-from vision.motion.line_of_sight import decompose, second_opinion
+from vision.motion.line_of_sight import SecondOpinion, decompose, second_opinion
 from vision.motion.motion_evidence import MotionEvidence
 
 BoolArray = NDArray[np.bool_]
@@ -55,12 +55,12 @@ class Proof:
     squared_sigmas: squared Mahalanobis distance of the filtered velocity from zero.
     """
 
-    moves: BoolArray
-    strength: FloatArray
-    surely_static: BoolArray
-    over: BoolArray
-    goes_on: BoolArray
-    squared_sigmas: FloatArray
+    moves: Flags
+    strength: Vector
+    surely_static: Flags
+    over: Flags
+    goes_on: Flags
+    squared_sigmas: Vector
 
 
 @inlined
@@ -73,37 +73,25 @@ def _entry(velocity: FloatArray, covariance: FloatArray, parts: FloatArray, k: i
 
 
 @compiled(
-    "float64[:, :, ::1], float64[:, :, :, ::1], float64[:, :, ::1], boolean[:, ::1], float64[:], int64[:],"
-    "float64[:], boolean[:], float64[:], int64[:], float64[:], int64[:], float64[:], float64[:], float64[:],"
-    "float64[:], boolean[:], boolean[:], boolean[:], boolean, float64, float64, float64"
+    MotionEvidence,
+    "float64[:, :, ::1], float64[:, :, :, ::1], float64[:, :, ::1]",
+    SecondOpinion,
+    "float64[:], boolean[:], float64, float64, float64",
 )
 def _proofs(
+    seen: MotionEvidence,
     velocity: FloatArray,
     covariance: FloatArray,
     parts: FloatArray,
-    opinion: BoolArray,
+    second: SecondOpinion,
     least_mps: FloatArray,
-    ends: NDArray[np.intp],
-    agreement: FloatArray,
-    restless: BoolArray,
-    restless_s: FloatArray,
-    arrived: NDArray[np.intp],
-    arriving_s: FloatArray,
-    cells: NDArray[np.intp],
-    size_m: FloatArray,
-    velocity_measured_s: FloatArray,
-    wander_mps: FloatArray,
-    depth_sigma_m: FloatArray,
-    advances: BoolArray,
-    border_is_guess: BoolArray,
     moving: BoolArray,
-    trusted: bool,
     fastest_mps: float,
     dt_s: float,
     threshold: float,
 ) -> tuple[BoolArray, FloatArray, BoolArray, BoolArray, BoolArray]:
     """moves to goes_on of Proof. velocity (4, T, 3), covariance (4, T, 3, 3), and parts (5, 4, T), value to
-    level of Split: of the four velocities. opinion (4, T): SecondOpinion. threshold: squared sigmas."""
+    level of Split: of the four velocities. threshold: squared sigmas."""
     count = len(moving)
     moves, surely_static = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
     over, goes_on, strength = np.zeros(count, np.bool_), np.zeros(count, np.bool_), np.zeros(count)
@@ -111,36 +99,43 @@ def _proofs(
         filtered = _entry(velocity, covariance, parts, _FILTERED, t)
         frame = _entry(velocity, covariance, parts, _FRAME, t)
         centre = _entry(velocity, covariance, parts, _SURFACE, t)
-        second = Opinion(opinion[0, t], opinion[1, t], opinion[2, t], opinion[3, t])
-        alike = agreement[t] * ends[t]
-        agreeing = alike if agreement[t] >= _MIN_AGREEMENT else 0.0
-        track_ends = Ends(ends[t], agreeing, restless[t], restless_s[t])
-        seen = Surface(cells[t], size_m[t], velocity_measured_s[t], wander_mps[t], depth_sigma_m[t])
-        arrival = arrival_of(arrived[t], arriving_s[t], cells[t], dt_s)
-        possible = filtered.speed_mps <= fastest_mps and size_m[t] <= _LARGEST_M
+        opinion = Opinion(
+            second.denies_along[t],
+            second.denies_across[t],
+            second.confirms_along[t],
+            second.confirms_across[t],
+        )
+        ends, cells, size_m = seen.ends[t], seen.cells[t], seen.size_m[t]
+        alike = seen.agreement[t] * ends
+        agreeing = alike if seen.agreement[t] >= _MIN_AGREEMENT else 0.0
+        track_ends = Ends(ends, agreeing, seen.restless[t], seen.restless_s[t])
+        wander_mps = _WANDER * seen.view_radps[t] * size_m + seen.growth_mps[t]
+        surface = Surface(cells, size_m, seen.velocity_measured_s[t], wander_mps, seen.depth_sigma_m[t])
+        arrival = arrival_of(seen.arrived[t], seen.arriving_s[t], cells, dt_s)
+        possible = filtered.speed_mps <= fastest_mps and size_m <= _LARGEST_M
         fast = filtered.speed_mps > least_mps[t]
         evident = (
-            by_fragments(filtered, frame, second, track_ends, threshold)
+            by_fragments(filtered, frame, opinion, track_ends, threshold)
             or by_unrest(filtered, track_ends, threshold)
             or by_arrival(filtered, arrival.some, threshold)
-            or by_surface(centre, seen, least_mps[t], dt_s, threshold)
+            or by_surface(centre, surface, least_mps[t], dt_s, threshold)
         )
         # The place where a mover has stopped was free a moment ago, so its arrival there is no proof.
         stands = not fast and filtered.sigma_mps < _KNOWN_SPEED * least_mps[t]
         stopped = moving[t] and stands
         came = (arrival.much and not stopped) or (arrival.lasting and not stands)
-        moves[t] = trusted and possible and ((evident and fast) or came)
+        moves[t] = seen.trusted and possible and ((evident and fast) or came)
         shown = np.minimum(np.maximum(filtered.along, filtered.across), np.maximum(frame.along, frame.across))
         strength[t] = np.minimum(shown / threshold, agreeing / ENDS_ACROSS)
         surely_static[t] = stands_surely(frame, agreeing, least_mps[t])
         # Neither depth nor a fragment tells it from the static surface beside it, along which it would drift.
-        lost = moving[t] and border_is_guess[t] and ends[t] == 0 and not arrival.some
+        lost = moving[t] and seen.border_is_guess[t] and ends == 0 and not arrival.some
         slow = filtered.speed_mps < STANDING_SHARE * least_mps[t]
         over[t] = surely_static[t] or (stopped and slow) or lost
-        still_moves = moving[t] and seems_to_move(filtered, advances[t], arrival.some, least_mps[t])
+        still_moves = moving[t] and seems_to_move(filtered, seen.advances[t], arrival.some, least_mps[t])
         # One fragment alone is no proof, but a reason to keep what more of them showed.
         one_moves = possible and fast and alike >= 2 and shown_across(filtered, frame, threshold)
-        goes_on[t] = still_moves or one_moves or (restless[t] and not moving[t])
+        goes_on[t] = still_moves or one_moves or (seen.restless[t] and not moving[t])
     return moves, strength, surely_static, over, goes_on
 
 
@@ -158,26 +153,13 @@ def prove(
     second = second_opinion(parts[_FILTERED], parts[_SURFACE], parts[_APART])
     least_mps = settings.min_speed_mps + _SPEED_PER_METRE * seen.distance_m
     proofs = _proofs(
+        seen,
         velocity,
         covariance,
         np.array((parts.value, parts.along, parts.across, parts.total, parts.level)),
-        np.array((second.denies_along, second.denies_across, second.confirms_along, second.confirms_across)),
+        second,
         least_mps,
-        seen.ends,
-        seen.agreement,
-        seen.restless,
-        seen.restless_s,
-        seen.arrived,
-        seen.arriving_s,
-        seen.cells,
-        seen.size_m,
-        seen.velocity_measured_s,
-        _WANDER * seen.view_radps * seen.size_m + seen.growth_mps,
-        seen.depth_sigma_m,
-        seen.advances,
-        seen.border_is_guess,
         moving,
-        seen.trusted,
         fastest_mps,
         dt_s,
         settings.sigmas**2,

@@ -8,11 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.compiled import compiled, inlined
-from hal.types import FloatArray
+from hal.types import FloatArray, Intrinsics, Pose
 from vision.bodies.boxes import overlaps
 from vision.bodies.tracks import Tracks
+from vision.camera.lens import pixel_of, ray_through
 from vision.detection import Detection
 from vision.motion.least_squares import FragmentVelocities
+from vision.motion.velocities import EndResiduals
+from vision.numerics.pose_axes import inner_point, inner_vector
 from vision.scene import Fragments, Obstacle
 
 MIN_SIGHTINGS = 3  # frames: a track seen in one or two is taken for a speckle
@@ -33,25 +36,10 @@ _PIECE_M2 = 0.5  # leg: maximum area of the piece, less than half of a body; its
 
 def obstacles(tracks: Tracks, detection: Detection) -> tuple[Obstacle, ...]:
     """The tracks that are listed as obstacles, in the camera axes of the detection."""
-    pose, camera, moving = detection.pose, detection.camera, tracks.moving
-    local, velocity, covariance = _in_camera(
-        tracks.state, tracks.covariance, pose.rotation, pose.translation_m
-    )
+    camera, moving = detection.camera, tracks.moving
+    local, velocity, covariance = _in_camera(tracks, detection.pose)
     unseen_s: FloatArray = np.multiply(detection.captured_ns - tracks.seen_ns, 1e-9, dtype=np.float64)
-    lens = (camera.fx, camera.fy, camera.cx, camera.cy, float(camera.width), float(camera.height))
-    listed, bbox = _listed(
-        local,
-        tracks.covariance,
-        unseen_s,
-        tracks.sightings,
-        tracks.cells,
-        moving,
-        tracks.nearly_hidden,
-        tracks.overhead,
-        tracks.box_m,
-        tracks.bbox_px,
-        *lens,
-    )
+    listed, bbox = _listed(tracks, local, unseen_s, camera)
     reported_moving = moving & ~_pieces(tracks, listed, bbox, local[:, 2], camera.fx)
     result = []
     ids, born_ns, fragments_on = tracks.ids.tolist(), tracks.born_ns.tolist(), tracks.fragments.tolist()
@@ -76,21 +64,16 @@ def obstacles(tracks: Tracks, detection: Detection) -> tuple[Obstacle, ...]:
     return tuple(result)
 
 
-@compiled("float64[:, ::1], float64[:, :, ::1], float64[:, :], float64[:]")
-def _in_camera(
-    state: FloatArray, covariance: FloatArray, rotation: FloatArray, translation_m: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Position (T, 3), velocity (T, 3) and its covariance (T, 3, 3) in the camera axes.
-
-    rotation, translation_m: pose of the camera in the fixed frame.
-    """
+@compiled(Tracks, Pose)
+def _in_camera(tracks: Tracks, pose: Pose) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Position (T, 3), velocity (T, 3) and its covariance (T, 3, 3) in the axes of the camera at pose."""
+    state, covariance, rotation = tracks.state, tracks.covariance, pose.rotation
     count = len(state)
-    local, velocity, spread = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 3, 3))
+    local, velocity, spread = np.empty((count, 3)), np.empty((count, 3)), np.zeros((count, 3, 3))
     for t in range(count):
+        local[t] = inner_point(pose, state[t, :3])
+        velocity[t] = inner_vector(pose, state[t, 3:])
         for i in range(3):
-            for k in range(3):
-                local[t, i] += rotation[k, i] * (state[t, k] - translation_m[k])
-                velocity[t, i] += rotation[k, i] * state[t, 3 + k]
             for j in range(3):
                 for k in range(3):
                     for m in range(3):
@@ -107,55 +90,57 @@ def _position_known(unseen_s: float, cells: int, moving: bool, nearly_hidden: bo
     return not (moving and nearly_hidden) or cells >= _LAST_CELLS
 
 
-@compiled(
-    "float64[:, ::1], float64[:, :, ::1], float64[::1], int64[::1], int64[::1], boolean[::1], boolean[::1],"
-    "boolean[::1], float64[:, ::1], float64[:, ::1], float64, float64, float64, float64, float64, float64"
-)
+@inlined
+def _expected_box(
+    box_m: FloatArray, x: float, y: float, z: float, camera: Intrinsics
+) -> tuple[float, float, float, float]:
+    """Left, upper, right, lower edge in the image of a whole body with its centre at x, y, z.
+
+    box_m (4,): as in Tracks.
+    """
+    left_m, upper_m, right_m, lower_m = box_m
+    left, upper = pixel_of(camera, x + left_m, y + upper_m, z)
+    right, lower = pixel_of(camera, x + right_m, y + lower_m, z)
+    return (
+        min(max(left, 0.0), camera.width),
+        min(max(upper, 0.0), camera.height),
+        min(max(right, 0.0), camera.width),
+        min(max(lower, 0.0), camera.height),
+    )
+
+
+@compiled(Tracks, "float64[:, ::1], float64[::1]", Intrinsics)
 def _listed(
-    local: FloatArray,
-    covariance: FloatArray,
-    unseen_s: FloatArray,
-    sightings: NDArray[np.intp],
-    cells: NDArray[np.intp],
-    moving: NDArray[np.bool_],
-    nearly_hidden: NDArray[np.bool_],
-    overhead: NDArray[np.bool_],
-    box_m: FloatArray,
-    bbox_px: FloatArray,
-    fx: float,
-    fy: float,
-    cx: float,
-    cy: float,
-    width: float,
-    height: float,
+    tracks: Tracks, local: FloatArray, unseen_s: FloatArray, camera: Intrinsics
 ) -> tuple[NDArray[np.bool_], FloatArray]:
-    """Which tracks are listed, (T,); and their boxes in the image, cut at its border, (T, 4)."""
-    listed, bbox = np.zeros(len(local), np.bool_), bbox_px.copy()
+    """Which tracks are listed, (T,); and their boxes in the image, cut at its border, (T, 4).
+
+    local (T, 3): centres in the camera axes. unseen_s (T,): time since they were last seen.
+    """
+    listed, bbox = np.zeros(len(local), np.bool_), tracks.bbox_px.copy()
     for t in range(len(local)):
         x, y, z = local[t, 0], local[t, 1], max(local[t, 2], 0.1)
-        sigma_mps = math.sqrt(covariance[t, 3, 3] + covariance[t, 4, 4] + covariance[t, 5, 5])
-        listed[t] = sightings[t] >= MIN_SIGHTINGS and local[t, 2] > 0.0
-        listed[t] = listed[t] and _position_known(
-            unseen_s[t], cells[t], moving[t], nearly_hidden[t], sigma_mps
-        )
+        moving, nearly_hidden, cells = tracks.moving[t], tracks.nearly_hidden[t], tracks.cells[t]
+        spread = tracks.covariance[t]
+        sigma_mps = math.sqrt(spread[3, 3] + spread[4, 4] + spread[5, 5])
+        listed[t] = tracks.sightings[t] >= MIN_SIGHTINGS and local[t, 2] > 0.0
+        listed[t] = listed[t] and _position_known(unseen_s[t], cells, moving, nearly_hidden, sigma_mps)
         # Something seen only above the robot may hang there. But a mover has legs, which something hides; a
         # nearly hidden one shows too little to tell.
-        legs = moving[t] and cells[t] >= _OVERHEAD_CELLS
-        listed[t] = listed[t] and (not overhead[t] or legs)
+        legs = moving and cells >= _OVERHEAD_CELLS
+        listed[t] = listed[t] and (not tracks.overhead[t] or legs)
         unseen = unseen_s[t] != 0.0
         if unseen:
-            u, v = x / z * fx + cx, y / z * fy + cy
-            listed[t] = listed[t] and 0.0 <= u < width and 0.0 <= v < height
+            u, v = pixel_of(camera, x, y, z)
+            listed[t] = listed[t] and 0.0 <= u < camera.width and 0.0 <= v < camera.height
         # The box of a mover that is hidden, or nearly hidden, is that of the whole body at its
         # predicted position, not that of the visible rest.
-        if moving[t] and (unseen or nearly_hidden[t]):
-            left, right = (x + box_m[t, 0]) / z * fx + cx, (x + box_m[t, 2]) / z * fx + cx
-            top, bottom = (y + box_m[t, 1]) / z * fy + cy, (y + box_m[t, 3]) / z * fy + cy
-            bbox[t, 0], bbox[t, 2] = min(max(left, 0.0), width), min(max(right, 0.0), width)
-            bbox[t, 1], bbox[t, 3] = min(max(top, 0.0), height), min(max(bottom, 0.0), height)
+        if moving and (unseen or nearly_hidden):
+            bbox[t] = _expected_box(tracks.box_m[t], x, y, z, camera)
             if not unseen:
-                bbox[t, 0], bbox[t, 1] = min(bbox[t, 0], bbox_px[t, 0]), min(bbox[t, 1], bbox_px[t, 1])
-                bbox[t, 2], bbox[t, 3] = max(bbox[t, 2], bbox_px[t, 2]), max(bbox[t, 3], bbox_px[t, 3])
+                seen = tracks.bbox_px[t]
+                bbox[t, 0], bbox[t, 1] = min(bbox[t, 0], seen[0]), min(bbox[t, 1], seen[1])
+                bbox[t, 2], bbox[t, 3] = max(bbox[t, 2], seen[2]), max(bbox[t, 3], seen[3])
     return listed, bbox
 
 
@@ -183,17 +168,8 @@ def fragments(
     velocities: FragmentVelocities,
 ) -> Fragments:
     """The Fragments of the Percept. owner (N,): ids of their tracks. moving (N,): whether these move."""
-    camera = detection.camera
     depth, position, velocity, sigma = _of_fragments(
-        detection.ends_px,
-        detection.near_m,
-        detection.motion.usable,
-        velocities.velocity_mps,
-        velocities.covariance,
-        camera.fx,
-        camera.fy,
-        camera.cx,
-        camera.cy,
+        detection.ends_px, detection.near_m, detection.motion, velocities, detection.camera
     )
     return Fragments(
         ids=detection.ids,
@@ -207,20 +183,13 @@ def fragments(
     )
 
 
-@compiled(
-    "float32[:, :, :], float32[:, :], boolean[:], float64[:, :], float64[:, :, :], float64, float64,"
-    "float64, float64"
-)
+@compiled("float32[:, :, :], float32[:, :]", EndResiduals, FragmentVelocities, Intrinsics)
 def _of_fragments(
     ends_px: NDArray[np.float32],
     near_m: NDArray[np.float32],
-    usable: NDArray[np.bool_],
-    velocity_mps: FloatArray,
-    covariance: FloatArray,
-    fx: float,
-    fy: float,
-    cx: float,
-    cy: float,
+    motion: EndResiduals,
+    velocities: FragmentVelocities,
+    camera: Intrinsics,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Depth (N,) and position (N, 3) of the fragments' middles; velocity (N, 3) and its sigma (N, 3).
 
@@ -233,9 +202,10 @@ def _of_fragments(
         depth[k] = np.float32(0.5) * (near_m[k, 0] + near_m[k, 1])
         u = np.float32(0.5) * (ends_px[k, 0, 0] + ends_px[k, 1, 0])
         v = np.float32(0.5) * (ends_px[k, 0, 1] + ends_px[k, 1, 1])
-        position[k, 0], position[k, 1] = (u - cx) / fx * depth[k], (v - cy) / fy * depth[k]
-        position[k, 2] = depth[k]
-        if usable[2 * k] or usable[2 * k + 1]:
+        x, y = ray_through(camera, u, v)
+        position[k, 0], position[k, 1], position[k, 2] = x * depth[k], y * depth[k], depth[k]
+        if motion.usable[2 * k] or motion.usable[2 * k + 1]:
             for i in range(3):
-                velocity[k, i], sigma[k, i] = velocity_mps[k, i], math.sqrt(covariance[k, i, i])
+                velocity[k, i] = velocities.velocity_mps[k, i]
+                sigma[k, i] = math.sqrt(velocities.covariance[k, i, i])
     return depth, position, velocity, sigma

@@ -22,13 +22,15 @@ from numpy.typing import NDArray
 
 from config.perception import DepthNoise
 from hal.compiled import compiled
-from hal.types import FloatArray, Pose
+from hal.types import FloatArray, Intrinsics, Pose
 from vision.bodies.grouping import ExpectedBodies
 from vision.bodies.tracks import Tracks
+from vision.camera.lens import ray_through
 from vision.depth.connected import MIN_PART_CELLS
 from vision.depth.depth_noise import depth_sigma_of
 from vision.depth.regions import Regions
 from vision.detection import Detection
+from vision.numerics.pose_axes import inner_point, outer_point
 
 # Standard deviation of the centroid of a very small surface: the width of a cell 2.3 m away.
 _CENTRE_SIGMA_M = 0.015
@@ -48,31 +50,15 @@ _NOT_VISIBLE, _WHOLE, _PARTIAL, _POSITION_ONLY, _NEARLY_HIDDEN = range(5)
 
 def update_from_surfaces(tracks: Tracks, detection: Detection, measured: Regions, noise: DepthNoise) -> None:
     """Update tracks with the surfaces measured, entry k for track k; one without cells stays predicted."""
-    rotation = detection.pose.rotation
     kind, centre_m, change, tracks.area_m2 = _kinds(
-        measured.cells,
-        measured.position_m,
-        measured.sides_visible,
-        rotation,
-        detection.pose.translation_m,
-        tracks.state,
-        tracks.sightings,
-        tracks.area_m2,
-        tracks.moving,
+        measured,
+        tracks,
+        detection.pose,
+        noise,
         detection.motion_known,
         -math.expm1(-detection.dt_s / _AREA_MEMORY_S),
-        noise.floor_m,
-        noise.quadratic_per_m,
     )
-    covariance = _centre_covariances(
-        kind,
-        measured.position_m,
-        measured.extent_m,
-        measured.top_and_bottom_visible,
-        rotation,
-        noise.floor_m,
-        noise.quadratic_per_m,
-    )
+    covariance = _centre_covariances(kind, measured, detection.pose, noise)
     centred = ((kind == _WHOLE) | (kind == _PARTIAL)).nonzero()[0]
     tracks.update_with_centre(centred, centre_m.take(centred, axis=0), covariance.take(centred, axis=0))
     placed = (kind == _POSITION_ONLY).nonzero()[0]
@@ -93,73 +79,47 @@ def _note_view(tracks: Tracks, detection: Detection, measured: Regions, kind: ND
     tracks.seen_ns[visible] = detection.captured_ns
     tracks.sightings += visible
     box_is_whole = visible & ((whole & ~nearly_hidden) | (tracks.sightings == 1))
-    camera = detection.camera
-    tracks.box_m = _boxes_m(
-        tracks.box_m,
-        box_is_whole,
-        measured.bbox_px,
-        measured.position_m,
-        camera.fx,
-        camera.fy,
-        camera.cx,
-        camera.cy,
-    )
+    tracks.box_m = _boxes_m(tracks, measured, box_is_whole, detection.camera)
     np.copyto(tracks.bbox_px, measured.bbox_px, where=visible[:, None])
     np.copyto(tracks.extent_m, measured.extent_m, where=visible[:, None])
     np.copyto(tracks.cells, measured.cells, where=visible)
 
 
-@compiled(
-    "int64[:], float64[:, :], boolean[:], float64[:, :], float64[:], float64[:, ::1], int64[::1],"
-    "float64[::1], boolean[::1], boolean, float64, float64, float64"
-)
+@compiled(Regions, Tracks, Pose, DepthNoise, "boolean, float64")
 def _kinds(
-    cells: NDArray[np.intp],
-    position_m: FloatArray,
-    sides_visible: NDArray[np.bool_],
-    rotation: FloatArray,
-    translation_m: FloatArray,
-    state: FloatArray,
-    sightings: NDArray[np.intp],
-    area_m2: FloatArray,
-    moving: NDArray[np.bool_],
-    motion_known: bool,
-    gain: float,
-    floor_m: float,
-    quadratic_per_m: float,
+    measured: Regions, tracks: Tracks, pose: Pose, noise: DepthNoise, motion_known: bool, gain: float
 ) -> tuple[NDArray[np.intp], FloatArray, FloatArray, FloatArray]:
     """Classify each surface.
 
     Returns its kind (T,), its centroid in the fixed frame (T, 3), the relative change from its usual area
-    (T,), and the usual area (T,), updated with gain. moving (T,): verdict of the frame before. gain: of the
-    running average. floor_m, quadratic_per_m: depth noise.
+    (T,), and the usual area (T,), updated with gain. tracks: with the verdict of the frame before. pose: of
+    the camera. gain: of the running average.
     """
-    kind, change, usual_m2 = np.full(len(cells), _NOT_VISIBLE), np.zeros(len(cells)), area_m2.copy()
-    centre_m = np.zeros((len(cells), 3))
-    for t in range(len(cells)):
-        if cells[t] < MIN_PART_CELLS:
+    count, sides_visible = len(measured.cells), measured.sides_visible
+    kind, change, usual_m2 = np.full(count, _NOT_VISIBLE), np.zeros(count), tracks.area_m2.copy()
+    centre_m = np.zeros((count, 3))
+    for t in range(count):
+        cells, moving = measured.cells[t], tracks.moving[t]
+        if cells < MIN_PART_CELLS:
             continue
-        depth_m = position_m[t, 2]
-        now_m2 = cells[t] * (depth_m * depth_m)
-        if sightings[t] == 0:
+        depth_m = measured.position_m[t, 2]
+        now_m2 = cells * (depth_m * depth_m)
+        if tracks.sightings[t] == 0:
             usual_m2[t] = now_m2
         change[t] = abs(now_m2 - usual_m2[t]) / usual_m2[t]
-        squared = 0.0
+        centre_m[t], squared = outer_point(pose, measured.position_m[t]), 0.0
         for i in range(3):
-            centre_m[t, i] = translation_m[i]
-            for k in range(3):
-                centre_m[t, i] += rotation[i, k] * position_m[t, k]
-            squared += (centre_m[t, i] - state[t, i]) ** 2
-        expected_m = _JUMP_M + 2.0 * depth_sigma_of(depth_m, floor_m, quadratic_per_m)
+            squared += (centre_m[t, i] - tracks.state[t, i]) ** 2
+        expected_m = _JUMP_M + 2.0 * depth_sigma_of(depth_m, noise.floor_m, noise.quadratic_per_m)
         # Without a known motion of the camera, its error would be taken for a motion of the tracks.
         steady = motion_known and math.sqrt(squared) <= expected_m
         if sides_visible[t] and change[t] <= _SAME_AREA and steady:
             kind[t] = _WHOLE
-        elif moving[t] and now_m2 < _NEARLY_HIDDEN_SHARE * usual_m2[t]:
+        elif moving and now_m2 < _NEARLY_HIDDEN_SHARE * usual_m2[t]:
             # The visible rest of a mover that is passing behind something does not show where its body is.
             kind[t] = _NEARLY_HIDDEN
             continue
-        elif moving[t] and steady:
+        elif moving and steady:
             kind[t] = _PARTIAL
         else:
             kind[t] = _POSITION_ONLY
@@ -167,27 +127,22 @@ def _kinds(
     return kind, centre_m, change, usual_m2
 
 
-@compiled("int64[::1], float64[:, :], float64[:, :], boolean[:], float64[:, :], float64, float64")
+@compiled("int64[::1]", Regions, Pose, DepthNoise)
 def _centre_covariances(
-    kind: NDArray[np.intp],
-    position_m: FloatArray,
-    extent_m: FloatArray,
-    top_and_bottom_visible: NDArray[np.bool_],
-    rotation: FloatArray,
-    floor_m: float,
-    quadratic_per_m: float,
+    kind: NDArray[np.intp], measured: Regions, pose: Pose, noise: DepthNoise
 ) -> FloatArray:
-    """(T, 3, 3) covariance of the centroids in the fixed frame. rotation: camera axes to fixed frame."""
-    covariance, variance = np.zeros((len(kind), 3, 3)), np.empty(3)
+    """(T, 3, 3) covariance of the centroids in the fixed frame. pose: of the camera."""
+    covariance, variance, rotation = np.zeros((len(kind), 3, 3)), np.empty(3), pose.rotation
     for t in range(len(kind)):
         if kind[t] == _NOT_VISIBLE:
             continue
-        size_m, depth_m = max(extent_m[t, 0], extent_m[t, 1]), position_m[t, 2]
+        width_m, height_m, deep_m = measured.extent_m[t]
+        size_m, depth_m = max(width_m, height_m), measured.position_m[t, 2]
         across_m = _CENTRE_SIGMA_M + _CENTRE_SHARE * size_m
-        along_m = _CENTRE_SIGMA_M + _CENTRE_DEPTH_SHARE * extent_m[t, 2]
-        noise_m = _CENTRE_NOISE * depth_sigma_of(depth_m, floor_m, quadratic_per_m)
+        along_m = _CENTRE_SIGMA_M + _CENTRE_DEPTH_SHARE * deep_m
+        noise_m = _CENTRE_NOISE * depth_sigma_of(depth_m, noise.floor_m, noise.quadratic_per_m)
         variance[0] = across_m**2
-        variance[1] = across_m**2 if top_and_bottom_visible[t] else _CUT_SIGMA_M**2
+        variance[1] = across_m**2 if measured.top_and_bottom_visible[t] else _CUT_SIGMA_M**2
         variance[2] = along_m**2 + noise_m**2
         if kind[t] == _PARTIAL:
             variance += (_SHIFT_SHARE * size_m) ** 2
@@ -198,58 +153,40 @@ def _centre_covariances(
     return covariance
 
 
-@compiled("float64[:, ::1], boolean[::1], float64[:, :], float64[:, :], float64, float64, float64, float64")
+@compiled(Tracks, Regions, "boolean[::1]", Intrinsics)
 def _boxes_m(
-    box_m: FloatArray,
-    box_is_whole: NDArray[np.bool_],
-    bbox_px: FloatArray,
-    position_m: FloatArray,
-    fx: float,
-    fy: float,
-    cx: float,
-    cy: float,
+    tracks: Tracks, measured: Regions, box_is_whole: NDArray[np.bool_], camera: Intrinsics
 ) -> FloatArray:
-    """box_m (T, 4) with the entries of the tracks with box_is_whole (T,) renewed.
+    """box_m (T, 4) of the tracks, with the entries of those with box_is_whole (T,) renewed.
 
     Left, upper, right and lower edge of the image box as offsets from the centroid, in metres at its depth.
     """
-    result = box_m.copy()
+    result = tracks.box_m.copy()
     for t in range(len(box_is_whole)):
         if box_is_whole[t]:
-            x, y, z = position_m[t, 0], position_m[t, 1], position_m[t, 2]
-            result[t, 0], result[t, 2] = (bbox_px[t, 0] - cx) / fx * z - x, (bbox_px[t, 2] - cx) / fx * z - x
-            result[t, 1], result[t, 3] = (bbox_px[t, 1] - cy) / fy * z - y, (bbox_px[t, 3] - cy) / fy * z - y
+            u0, v0, u1, v1 = measured.bbox_px[t]
+            x, y, z = measured.position_m[t]
+            left, upper = ray_through(camera, u0, v0)
+            right, lower = ray_through(camera, u1, v1)
+            result[t] = left * z - x, upper * z - y, right * z - x, lower * z - y
     return result
 
 
 def expected_bodies(tracks: Tracks, pose: Pose, noise: DepthNoise) -> ExpectedBodies:
     """Where the bodies of tracks are expected in the axes of a camera at pose."""
-    centre_m, sigma_m = _expected(
-        tracks.state,
-        pose.rotation,
-        pose.translation_m,
-        noise.floor_m,
-        noise.quadratic_per_m,
-    )
+    centre_m, sigma_m = _expected(tracks, pose, noise)
     return ExpectedBodies(centre_m, tracks.extent_m, tracks.box_m, sigma_m)
 
 
-@compiled("float64[:, ::1], float64[:, :], float64[:], float64, float64")
-def _expected(
-    state: FloatArray,
-    rotation: FloatArray,
-    translation_m: FloatArray,
-    floor_m: float,
-    quadratic_per_m: float,
-) -> tuple[FloatArray, FloatArray]:
+@compiled(Tracks, Pose, DepthNoise)
+def _expected(tracks: Tracks, pose: Pose, noise: DepthNoise) -> tuple[FloatArray, FloatArray]:
     """centre_m and sigma_m of ExpectedBodies."""
-    centre_m, sigma_m = np.zeros((len(state), 3)), np.empty(len(state))
-    for t in range(len(state)):
-        for i in range(3):
-            for k in range(3):
-                centre_m[t, i] += rotation[k, i] * (state[t, k] - translation_m[k])
+    count = len(tracks.state)
+    centre_m, sigma_m = np.empty((count, 3)), np.empty(count)
+    for t in range(count):
+        centre_m[t] = inner_point(pose, tracks.state[t, :3])
         depth_m = max(centre_m[t, 2], 0.0)
-        sigma_m[t] = depth_sigma_of(depth_m, floor_m, quadratic_per_m)
+        sigma_m[t] = depth_sigma_of(depth_m, noise.floor_m, noise.quadratic_per_m)
     return centre_m, sigma_m
 
 

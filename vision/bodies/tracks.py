@@ -7,12 +7,14 @@ velocities and vision/bodies/judgement.py update them.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, field, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hal.compiled import compiled
-from hal.types import FloatArray
+from hal.types import Flags, FloatArray, Integers, Matrices, Matrix, Vector
 from vision.numerics import kalman
 
 _TRAIL_S = 0.3  # time constant of the trailing average of a centre: several frames, less than a step lasts
@@ -23,50 +25,54 @@ _UNPROVEN_S = 0.05  # a frame or two: for that long proof may be missing by chan
 _LEFT_SHARE = 0.6  # of its width: a track displaced by more has clearly left its former place
 
 
-class Tracks:
-    """Parallel arrays with one entry per track; __init__ explains each of them."""
+def _column(kind: type, *shape: int) -> Any:
+    """A field with one entry of this type and shape per track; no tracks yet."""
+    return field(default_factory=lambda: np.empty((0, *shape), kind), init=False)
 
-    def __init__(self) -> None:
-        self.ids = np.empty(0, np.int64)  # in ascending order
-        # Filter of position and velocity (T, 6), from the centres of the surface and from the fragments.
-        self.state = np.empty((0, 6))
-        self.covariance = np.empty((0, 6, 6))
-        # The same from the centres of the visible surface alone, as a second opinion.
-        self.surface_state = np.empty((0, 6))
-        self.surface_covariance = np.empty((0, 6, 6))
-        self.trailing_m = np.empty((0, 3))  # running average of the centre
-        self.born_ns = np.empty(0, np.int64)  # first seen
-        self.seen_ns = np.empty(0, np.int64)  # last seen
-        self.sightings = np.empty(0, np.intp)  # number of frames in which it was seen
-        # As last seen.
-        self.bbox_px = np.empty((0, 4))  # box in the image
-        self.extent_m = np.empty((0, 3))  # size along the camera axes
-        self.cells = np.empty(0, np.intp)  # cells of the depth grid; 0: it has gone behind something since
-        self.fragments = np.empty(0, np.intp)  # number of fragments on it
-        self.box_m = np.empty((0, 4))  # edges of the last box that showed all of it, from its centre
-        self.area_m2 = np.empty(0)  # running average, up to a common factor
-        self.growth_mps = np.empty(0)  # speed of the centre that a growing or shrinking surface can explain
-        # For how long the centre has measured the velocity without a break.
-        self.velocity_measured_s = np.empty(0)
-        self.nearly_hidden = np.empty(0, np.bool_)  # a mover of which only a small rest was visible
-        # A mover without an edge in depth to the static surface beside it: where it ends there is a guess.
-        self.border_is_guess = np.empty(0, np.bool_)
-        self.overhead = np.empty(0, np.bool_)  # seen only above the robot's height; the rest is out of sight
-        # The verdict (vision/bodies/judgement.py).
-        self.evidence = np.empty(0)  # the score it rests on
-        self.moving = np.empty(0, np.bool_)  # now
-        self.ever_moved = np.empty(0, np.bool_)  # at any time
-        self.confidence = np.empty(0)  # 0..1
-        self.surely_static = np.empty(0, np.bool_)  # its fragments are sure that it stands still
-        self.no_evidence_s = np.empty(0)  # time without evidence; inf: there never was any
-        self.moving_s = np.empty(0)  # for how long the verdict has been that it moves
-        self.unproven_s = np.empty(0)  # since a frame last proved that it moves, or since its birth
-        # Time in which nearly all ends contradicted standing still, less the time in which they did not.
-        self.restless_s = np.empty(0)
-        # Time in which part of the surface was newly arrived, less the time in which none was.
-        self.arriving_s = np.empty(0)
-        self._fields = tuple(vars(self))
-        self._next_id = 1
+
+@dataclass(slots=True, eq=False)
+class Tracks:
+    """Parallel arrays with one entry per track."""
+
+    ids: Integers = _column(np.int64)  # in ascending order
+    # Filter of position and velocity (T, 6), from the centres of the surface and from the fragments.
+    state: Matrix = _column(float, 6)
+    covariance: Matrices = _column(float, 6, 6)
+    # The same from the centres of the visible surface alone, as a second opinion.
+    surface_state: Matrix = _column(float, 6)
+    surface_covariance: Matrices = _column(float, 6, 6)
+    trailing_m: Matrix = _column(float, 3)  # running average of the centre
+    born_ns: Integers = _column(np.int64)  # first seen
+    seen_ns: Integers = _column(np.int64)  # last seen
+    sightings: Integers = _column(np.intp)  # number of frames in which it was seen
+    # As last seen.
+    bbox_px: Matrix = _column(float, 4)  # box in the image
+    extent_m: Matrix = _column(float, 3)  # size along the camera axes
+    cells: Integers = _column(np.intp)  # cells of the depth grid; 0: it has gone behind something since
+    fragments: Integers = _column(np.intp)  # number of fragments on it
+    box_m: Matrix = _column(float, 4)  # edges of the last box that showed all of it, from its centre
+    area_m2: Vector = _column(float)  # running average, up to a common factor
+    growth_mps: Vector = _column(float)  # speed of the centre that a growing or shrinking surface can explain
+    # For how long the centre has measured the velocity without a break.
+    velocity_measured_s: Vector = _column(float)
+    nearly_hidden: Flags = _column(np.bool_)  # a mover of which only a small rest was visible
+    # A mover without an edge in depth to the static surface beside it: where it ends there is a guess.
+    border_is_guess: Flags = _column(np.bool_)
+    overhead: Flags = _column(np.bool_)  # seen only above the robot's height; the rest is out of sight
+    # The verdict (vision/bodies/judgement.py).
+    evidence: Vector = _column(float)  # the score it rests on
+    moving: Flags = _column(np.bool_)  # now
+    ever_moved: Flags = _column(np.bool_)  # at any time
+    confidence: Vector = _column(float)  # 0..1
+    surely_static: Flags = _column(np.bool_)  # its fragments are sure that it stands still
+    no_evidence_s: Vector = _column(float)  # time without evidence; inf: there never was any
+    moving_s: Vector = _column(float)  # for how long the verdict has been that it moves
+    unproven_s: Vector = _column(float)  # since a frame last proved that it moves, or since its birth
+    # Time in which nearly all ends contradicted standing still, less the time in which they did not.
+    restless_s: Vector = _column(float)
+    # Time in which part of the surface was newly arrived, less the time in which none was.
+    arriving_s: Vector = _column(float)
+    _next_id: int = field(default=1, init=False)
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -96,7 +102,7 @@ class Tracks:
         if chosen.all():
             return
         kept = chosen.nonzero()[0]  # taking by index is several times as fast as by mask
-        for name in self._fields:
+        for name in _COLUMNS:
             setattr(self, name, getattr(self, name).take(kept, axis=0))
 
     def index_of(self, ids: NDArray[np.int64]) -> NDArray[np.intp]:
@@ -123,7 +129,7 @@ class Tracks:
         spread = np.diag([sigma_m**2] * 3 + [max_speed_mps**2] * 3)
         given["covariance"] = given["surface_covariance"] = spread
         self._next_id += count
-        for name in self._fields:
+        for name in _COLUMNS:
             old = getattr(self, name)
             new = np.zeros((count, *old.shape[1:]), old.dtype)
             if name in given:
@@ -172,7 +178,7 @@ class Tracks:
         if elapsed_s <= 0.0:
             return np.zeros(len(self), np.bool_)
         asked = self.moving & (self.unproven_s >= _UNPROVEN_S)
-        return _must_have_left(asked, self.state, self.extent_m, sight, resolves_m, elapsed_s)
+        return _must_have_left(self, asked, sight, resolves_m, elapsed_s)
 
     def update_durations(self, proven: NDArray[np.bool_], dt_s: float) -> None:
         """Update the durations after a verdict, dt_s after the last. proven (T,): motion, by this frame."""
@@ -216,6 +222,9 @@ class Tracks:
             position_m,
             noise,
         )
+
+
+_COLUMNS = tuple(one.name for one in fields(Tracks) if one.name != "_next_id")
 
 
 @compiled("int64[::1], int64[::1]")
@@ -270,25 +279,20 @@ def _sight(state: FloatArray, camera_m: FloatArray) -> tuple[FloatArray, FloatAr
     return sight, distance_m
 
 
-@compiled("boolean[::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], float64")
+@compiled(Tracks, "boolean[::1], float64[:, ::1], float64[::1], float64")
 def _must_have_left(
-    asked: NDArray[np.bool_],
-    state: FloatArray,
-    extent_m: FloatArray,
-    sight: FloatArray,
-    resolves_m: FloatArray,
-    elapsed_s: float,
+    tracks: Tracks, asked: NDArray[np.bool_], sight: FloatArray, resolves_m: FloatArray, elapsed_s: float
 ) -> NDArray[np.bool_]:
     """(T,) of the tracks asked (T,), those that must have left their place of elapsed_s ago."""
     gone = np.zeros(len(asked), np.bool_)
     for t in range(len(asked)):
         along_m, squared = 0.0, 0.0
         for i in range(3):
-            displacement_m = elapsed_s * state[t, 3 + i]
+            displacement_m = elapsed_s * tracks.state[t, 3 + i]
             along_m += displacement_m * sight[t, i]
             squared += displacement_m * displacement_m
         across_m = math.sqrt(max(squared - along_m * along_m, 0.0))
-        width_m, depth_m = max(extent_m[t, 0], extent_m[t, 2]), extent_m[t, 2]
+        width_m, depth_m = max(tracks.extent_m[t, 0], tracks.extent_m[t, 2]), tracks.extent_m[t, 2]
         far = across_m >= _LEFT_SHARE * width_m or abs(along_m) >= max(resolves_m[t], _LEFT_SHARE * depth_m)
         gone[t] = asked[t] and far
     return gone

@@ -7,5 +7,5 @@ Files, in the order in which they come into play within one frame:
 * frozen_depth - whether depth repeats while the camera moves; used by health.
 * health - how far a frame can be trusted.
 * mount_check - whether the floor is where the mounting puts it.
-* lens - pixels to rays, rotation vectors; used throughout.
+* lens - pixels to rays and back, rotation vectors; used throughout.
 """

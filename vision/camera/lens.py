@@ -1,4 +1,4 @@
-"""Pixels to rays (eqs. 3 and 4 of Daeef 2020, with cx, cy instead of w/2, h/2), and rotation vectors."""
+"""Pixels to rays and back (eqs. 3, 4 of Daeef 2020, with cx, cy for w/2, h/2), and rotation vectors."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from hal.compiled import inlined
 from hal.types import FloatArray, Intrinsics
 
 # Images and grids are float32, geometry is float64; functions that read both take either.
@@ -22,6 +23,18 @@ def rays(pixels: RealArray, camera: Intrinsics) -> FloatArray:
     result[1] = (pixels[:, 1] - camera.cy) / camera.fy
     result[2] = 1.0
     return result.T
+
+
+@inlined
+def ray_through(camera: Intrinsics, u: float, v: float) -> tuple[float, float]:
+    """x and y at z = 1 of the ray through a pixel, for compiled steps."""
+    return (u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy
+
+
+@inlined
+def pixel_of(camera: Intrinsics, x: float, y: float, z: float) -> tuple[float, float]:
+    """The pixel where a point of the optical frame is seen, for compiled steps."""
+    return x / z * camera.fx + camera.cx, y / z * camera.fy + camera.cy
 
 
 def row_delays(v_px: RealArray, camera: Intrinsics) -> FloatArray:

@@ -6,7 +6,8 @@ Files, in the order in which they come into play:
 * depth_grid - the coarse grid of depth, with heights over the floor.
 * depth_mask - near and far surface around pixels; the depth of fragments.
 * connected - cells that stand out of the floor, and their connected parts.
-* regions - box, centre, size and occlusion of each part.
+* regions - box, centre and size of each part.
+* occlusion - whether something nearer hides its sides or its lower end.
 * level_bands - the upright bands of the view in which free space is given.
 * near_floor - learns how near to the camera the floor can be measured.
 * free_space - the nearest surface and the known distance in each band: FreeSpace.

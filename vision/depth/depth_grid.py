@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Annotated
 
 import cv2
 import numpy as np
@@ -22,6 +23,9 @@ from vision.depth.depth_noise import depth_sigma_of
 
 FloatGrid = NDArray[np.float32]
 BoolGrid = NDArray[np.bool_]
+# The same with the types that compiled steps need (hal/compiled.py): one value a cell; one a row or column.
+CellValues = Annotated[FloatGrid, "float32[:, ::1]"]
+CellRays = Annotated[FloatGrid, "float32[::1]"]
 
 # Noise of a cell's height relative to the noise that one pixel's depth would cause. A cell is the median of
 # many pixels, but these are neighbours and share noise, so the factor is larger than their number suggests.
@@ -55,12 +59,12 @@ class DepthGrid:
 
     step_px: int
     offset_px: float
-    depth_m: FloatGrid
-    inverse_depth: FloatGrid
+    depth_m: CellValues
+    inverse_depth: CellValues
     valid: BoolGrid
     beyond: BoolGrid
-    x: FloatGrid
-    y: FloatGrid
+    x: CellRays
+    y: CellRays
     forward_m: FloatGrid
     height_m: FloatGrid | None
     height_sigma_m: FloatGrid | None

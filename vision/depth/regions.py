@@ -1,4 +1,4 @@
-"""Regions: box, centre and size of each labelled set of cells, and whether something hides part of it.
+"""Regions: box, centre and size of each labelled set of cells (part).
 
 Used for connected parts (vision/depth/connected.py) and for the surfaces of tracks. Terms (cell, part,
 region): vision/__init__.py.
@@ -7,27 +7,19 @@ region): vision/__init__.py.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hal.compiled import compiled, inlined
-from hal.types import FloatArray
-from vision.depth.connected import MAX_JUMP, MIN_JUMP, IntGrid
+from hal.types import Flags, FloatArray, Integers, Matrix
+from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import DepthGrid, FloatGrid
-
-Counts = NDArray[np.intp]
-Flags = NDArray[np.bool_]
 
 _UNIFORM = 3.46  # the length of a uniform distribution in standard deviations: square root of 12
 # A part this close to the floor, in metres and per metre of depth, stands on it: the lowest part of a body is
 # taken for floor because of the clearance and the margins of above_floor().
 _FOOT_M, _FOOT_PER_METRE = 0.12, 0.015
-_OCCLUDED_SHARE = 0.15  # of its rows: at fewer rims, a nearer neighbour is noise
-_GAP_CELLS = 3  # a stereo camera measures nothing in some cells beside a nearer surface
-_HIDDEN_SHARE = 0.5  # of its width: if less of its lower end is hidden, the rest is seen to end
-_HEAD_M = 0.2  # height of a head down to the chin: a lower part is a strip of something
 _RIM = 8  # the rim of a part on either side is 1/8 of its columns
 
 
@@ -40,16 +32,16 @@ class Regions:
     bbox_px: box in the image, u0, v0, u1, v1, (R, 4).
     position_m: centre of the visible surface in the camera axes, (R, 3).
     extent_m: size along the camera axes, (R, 3).
-    sides_visible: not cut by the left or right border of the image, (R,). See also with_occlusion.
+    sides_visible: not cut by the left or right border of the image, (R,). See also vision/depth/occlusion.py.
     top_and_bottom_visible: not cut by its upper or lower border, (R,).
     overlapped: something nearer begins at its left or right rim, (R,).
     """
 
-    cells: Counts
-    rows: Counts
-    bbox_px: FloatArray
-    position_m: FloatArray
-    extent_m: FloatArray
+    cells: Integers
+    rows: Integers
+    bbox_px: Matrix
+    position_m: Matrix
+    extent_m: Matrix
     sides_visible: Flags
     top_and_bottom_visible: Flags
     overlapped: Flags
@@ -79,7 +71,8 @@ def exchanged(regions: Regions, others: Regions, chosen: Flags) -> Regions:
 def measure(grid: DepthGrid, labels: IntGrid, count: int) -> Regions:
     """Regions of the parts 1..count of labels (h, w); entry k - 1 is part k.
 
-    sides_visible accounts for the image border only, and overlapped is False; with_occlusion adds occlusion.
+    sides_visible accounts for the image border only, and overlapped is False: vision/depth/occlusion.py adds
+    what hides a part.
     """
     on_floor = grid.up is not None
     cells, rows, bbox_px, position_m, extent_m, sides_visible, top_and_bottom_visible = _measured(
@@ -100,7 +93,7 @@ def measure(grid: DepthGrid, labels: IntGrid, count: int) -> Regions:
 
 
 @inlined
-def _edges(labels: IntGrid, count: int) -> tuple[Counts, Counts]:
+def _edges(labels: IntGrid, count: int) -> tuple[Integers, Integers]:
     """(R,) number of cells of parts 1..count of labels (h, w), and (R, 4) their left, top, right, bottom.
 
     These are columns and rows of the grid; 0, 0, 0, -1 for parts without cells.
@@ -147,7 +140,7 @@ def _foot_px(
 
 @inlined
 def _sums(
-    inverse: FloatGrid, labels: IntGrid, x: FloatGrid, y: FloatGrid, edges: Counts
+    inverse: FloatGrid, labels: IntGrid, x: FloatGrid, y: FloatGrid, edges: Integers
 ) -> tuple[FloatArray, FloatArray]:
     """Sums over each part with edges (R, 4), (R, 4): inverse depth, its square, x, y.
 
@@ -191,7 +184,7 @@ def _measured(
     offset_px: float,
     up: FloatArray,
     height_m: float,
-) -> tuple[Counts, Counts, FloatArray, FloatArray, FloatArray, Flags, Flags]:
+) -> tuple[Integers, Integers, FloatArray, FloatArray, FloatArray, Flags, Flags]:
     """cells and rows (R,), bbox_px (R, 4), position_m and extent_m (R, 3), sides_visible and
     top_and_bottom_visible (R,) of the parts.
 
@@ -225,70 +218,3 @@ def _measured(
         extent_m[part, 1] = (y[bottom] - y[top]) * depth_m
         extent_m[part, 2] = _UNIFORM * np.sqrt(max(mean_square - mean * mean, 0.0)) * depth_m * depth_m
     return cells, rows, bbox_px, position_m, extent_m, sides_visible, top_and_bottom_visible
-
-
-def with_occlusion(grid: DepthGrid, labels: IntGrid, regions: Regions) -> Regions:
-    """regions with occlusion taken into account: sides_visible is restricted, overlapped is set.
-
-    The sides of a part stay visible only if no nearer surface hides its left or right side, and if it ends
-    there at an edge in depth. Where a part was divided from its surroundings by a guess, its centre depends
-    on the guess.
-    """
-    hidden, overlapped = _hidden_cells(grid.inverse_depth, labels, len(regions.cells), np.float32(MIN_JUMP))
-    least = _OCCLUDED_SHARE * regions.rows
-    return replace(
-        regions, sides_visible=regions.sides_visible & (hidden <= least), overlapped=overlapped > least
-    )
-
-
-@compiled("float32[:, ::1], int32[:, ::1], int64, float32")
-def _hidden_cells(inverse: FloatGrid, labels: IntGrid, count: int, jump: np.float32) -> tuple[Counts, Counts]:
-    """Two counts of rim cells of each part, (count,) each.
-
-    The first: cells at the left or right rim beside which there is something nearer, or another part at the
-    same depth. The second: rim cells beside which there is another part that is nearer.
-
-    Beside a nearer surface a stereo camera measures nothing, and the far side of a jump belongs to no part.
-    Therefore the neighbour is the next part after a gap of up to _GAP_CELLS. jump: 1/m; less is noise.
-    """
-    room = max(count, labels.max()) + 1
-    hidden, overlapped = np.zeros(room, np.intp), np.zeros(room, np.intp)
-    for i in range(labels.shape[0]):
-        neighbour = -1  # column of the last cell in this row that belongs to a part
-        for j in range(labels.shape[1]):
-            here = labels[i, j]
-            if j > 0 and labels[i, j - 1] != here:
-                beside, step = labels[i, j - 1], inverse[i, j] - inverse[i, j - 1]
-                if abs(step) > jump:
-                    hidden[beside if step > 0 else here] += 1
-                elif beside > 0 and here > 0:
-                    hidden[beside] += 1
-                    hidden[here] += 1
-            if here == 0:
-                continue
-            if neighbour >= 0 and labels[i, neighbour] != here and j - neighbour <= _GAP_CELLS + 1:
-                step = inverse[i, j] - inverse[i, neighbour]
-                if abs(step) > jump:
-                    overlapped[labels[i, neighbour] if step > 0 else here] += 1
-            neighbour = j
-    return hidden[1 : count + 1].copy(), overlapped[1 : count + 1].copy()
-
-
-def hidden_below(grid: DepthGrid, labels: IntGrid, regions: Regions) -> Flags:
-    """(R,) parts of at least _HEAD_M height whose lower end is hidden over at least half of their width.
-
-    How far down they reach is not known. Below the lower end of a beam, in contrast, something farther is
-    seen.
-    """
-    inverse, flat = grid.inverse_depth.ravel(), labels.ravel()
-    width = labels.shape[1]
-    rims = ((flat[:-width] > 0) & (flat[:-width] != flat[width:])).nonzero()[0]
-    below = np.zeros(len(rims), inverse.dtype)
-    for step in range(1, _GAP_CELLS + 1):
-        below = np.maximum(below, inverse.take(np.minimum(rims + step * width, len(flat) - 1)))
-    nearer = below - inverse.take(rims) > np.float32(MAX_JUMP)
-    cells = np.bincount(flat.take(rims[nearer]), minlength=len(regions.cells) + 1)[1:]
-    across = (regions.bbox_px[:, 2] - regions.bbox_px[:, 0]) / grid.step_px
-    tall = regions.extent_m[:, 1] >= _HEAD_M
-    result: Flags = tall & (regions.cells > 0) & (cells >= _HIDDEN_SHARE * across)
-    return result

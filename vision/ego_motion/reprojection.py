@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.compiled import compiled
-from hal.types import FloatArray, Intrinsics
-from vision.camera.lens import row_delays
+from hal.types import Flags, FloatArray, Intrinsics, Matrix, Vector
+from vision.camera.lens import ray_through, row_delays
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -24,11 +24,11 @@ class Anchors:
     usable: (N,).
     """
 
-    points_m: FloatArray
-    range_m: FloatArray
-    depth_sigma_m: FloatArray
-    pixel_cov: FloatArray
-    usable: NDArray[np.bool_]
+    points_m: Matrix
+    range_m: Matrix
+    depth_sigma_m: Vector
+    pixel_cov: Matrix
+    usable: Flags
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,39 +48,16 @@ class View:
 
 def view_of(anchors: Anchors, pixels: FloatArray, use: NDArray[np.intp], camera: Intrinsics) -> View:
     """The View of the points use (M,), as indices. pixels (N, 2): where the points are seen now."""
-    return View(
-        *_view(
-            anchors.points_m,
-            anchors.range_m,
-            np.ascontiguousarray(anchors.depth_sigma_m),
-            anchors.pixel_cov,
-            pixels,
-            row_delays(pixels[:, 1], camera),
-            use,
-            camera.fx,
-            camera.fy,
-            camera.cx,
-            camera.cy,
-        )
-    )
+    return View(*_view(anchors, pixels, row_delays(pixels[:, 1], camera), use, camera))
 
 
-@compiled(
-    "float64[:, :], float64[:, :], float64[::1], float64[:, :], float64[:, :], float64[::1], int64[::1],"
-    " float64, float64, float64, float64"
-)
+@compiled(Anchors, "float64[:, :], float64[::1], int64[::1]", Intrinsics)
 def _view(
-    points_m: FloatArray,
-    range_m: FloatArray,
-    depth_sigma_m: FloatArray,
-    pixel_cov: FloatArray,
+    anchors: Anchors,
     pixels: FloatArray,
     delays: FloatArray,
     use: NDArray[np.intp],
-    fx: float,
-    fy: float,
-    cx: float,
-    cy: float,
+    camera: Intrinsics,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """The fields of View."""
     count = len(use)
@@ -88,17 +65,16 @@ def _view(
     for k in range(count):
         one = use[k]
         for i in range(3):
-            lines[k, 0, i], lines[k, 1, i] = points_m[one, i], range_m[one, i]
-        seen[k, 0], seen[k, 1] = (pixels[one, 0] - cx) / fx, (pixels[one, 1] - cy) / fy
+            lines[k, 0, i], lines[k, 1, i] = anchors.points_m[one, i], anchors.range_m[one, i]
+        seen[k, 0], seen[k, 1] = ray_through(camera, pixels[one, 0], pixels[one, 1])
         seen[k, 2] = delays[one]
         # The inverse of the Cholesky factor.
-        first = math.sqrt(pixel_cov[one, 0])
-        low = pixel_cov[one, 1] / first
-        second = math.sqrt(max(pixel_cov[one, 2] - low * low, 1e-6))
-        whitening[k, 0], whitening[k, 1], whitening[k, 2] = (
-            fx / first,
-            -fx * low / (first * second),
-            fy / second,
-        )
-        whitening[k, 3] = depth_sigma_m[one] * depth_sigma_m[one]
+        uu, uv, vv = anchors.pixel_cov[one]
+        first = math.sqrt(uu)
+        low = uv / first
+        second = math.sqrt(max(vv - low * low, 1e-6))
+        whitening[k, 0] = camera.fx / first
+        whitening[k, 1] = -camera.fx * low / (first * second)
+        whitening[k, 2] = camera.fy / second
+        whitening[k, 3] = anchors.depth_sigma_m[one] * anchors.depth_sigma_m[one]
     return lines, seen, whitening

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.compiled import compiled
-from hal.types import FloatArray, Intrinsics, Pose
+from hal.types import FloatArray, Integers, Intrinsics, Matrix, Pose, Vector
 from vision.ego_motion.rolling_shutter import straight_rays
 
 HISTORY = 24  # frames: enough for the window of 0.25 s at 90 frames a second
@@ -28,13 +28,13 @@ class AnchorEnds:
     lag_frames, lag_s: how long ago, (N,).
     """
 
-    direction: FloatArray
-    origin: FloatArray
-    depth_m: FloatArray
-    far_m: FloatArray
-    depth_samples: FloatArray
-    lag_frames: NDArray[np.intp]
-    lag_s: FloatArray
+    direction: Matrix
+    origin: Matrix
+    depth_m: Vector
+    far_m: Vector
+    depth_samples: Vector
+    lag_frames: Integers
+    lag_s: Vector
 
 
 class FragmentStore:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from config.perception import DepthNoise
 from hal.compiled import compiled
-from hal.types import FloatArray, Pose
+from hal.types import Flags, FloatArray, Pose, Vector
 from vision.depth.depth_mask import UNSEEN_M
 from vision.depth.depth_noise import depth_sigma_of
 from vision.ego_motion.reprojection import Anchors
@@ -44,25 +44,16 @@ class AnchorDepths:
     mixed: the surroundings of the end lie on two surfaces.
     """
 
-    near_m: FloatArray
-    sigma_m: FloatArray
-    far_m: FloatArray
-    known: NDArray[np.bool_]
-    mixed: NDArray[np.bool_]
+    near_m: Vector
+    sigma_m: Vector
+    far_m: Vector
+    known: Flags
+    mixed: Flags
 
 
 def depths_with_sigma(anchor: AnchorEnds, noise: DepthNoise) -> AnchorDepths:
     """AnchorDepths of anchor. An end without depth is taken for a distant one whose depth is hardly known."""
-    return AnchorDepths(
-        *_with_sigma(
-            np.ascontiguousarray(anchor.depth_m),
-            np.ascontiguousarray(anchor.far_m),
-            np.ascontiguousarray(anchor.depth_samples),
-            UNSEEN_M,
-            noise.floor_m,
-            noise.quadratic_per_m,
-        )
-    )
+    return AnchorDepths(*_with_sigma(anchor, noise))
 
 
 def static_points(
@@ -79,16 +70,7 @@ def static_points(
     still measures the camera's rotation, across its epipolar line. In a wide hall there may be hardly any
     other ends.
     """
-    points_m, sigma_m, usable = _static(
-        np.ascontiguousarray(anchor.direction),
-        np.ascontiguousarray(anchor.origin),
-        depths.near_m,
-        depths.sigma_m,
-        depths.far_m,
-        depths.mixed,
-        np.ascontiguousarray(moving),
-        distant_m,
-    )
+    points_m, sigma_m, usable = _static(anchor, depths, moving, distant_m)
     return Anchors(
         points_m=points_m,
         range_m=anchor.direction.T,
@@ -104,17 +86,7 @@ def average_depth(store: FragmentStore, before: AnchorEnds, pose: Pose, noise: D
     If the two do not agree, the average begins anew: the end is on another surface, or it moves in depth.
     before: the ends in the frame before. pose: the camera now. Changes depth_m and depth_samples of store.
     """
-    store.depth_m, store.depth_samples = _averaged(
-        np.ascontiguousarray(before.direction),
-        np.ascontiguousarray(before.origin),
-        np.ascontiguousarray(before.depth_m),
-        np.ascontiguousarray(store.near_m),
-        np.ascontiguousarray(store.depth_samples),
-        np.ascontiguousarray(pose.rotation),
-        np.ascontiguousarray(pose.translation_m),
-        noise.floor_m,
-        noise.quadratic_per_m,
-    )
+    store.depth_m, store.depth_samples = _averaged(before, store.near_m, store.depth_samples, pose, noise)
 
 
 def depth_steps(
@@ -124,123 +96,89 @@ def depth_steps(
 
     static_m (2N, 3): where the ends would be if they were static, in the camera's axes.
     """
-    return _steps(
-        static_m,
-        depths.sigma_m,
-        np.ascontiguousarray(store.near_m),
-        np.ascontiguousarray(anchor.depth_samples),
-        anchor.lag_frames,
-        np.ascontiguousarray(anchor.lag_s),
-        noise.floor_m,
-        noise.quadratic_per_m,
-    )
+    return _steps(anchor, depths, static_m, store.near_m, noise)
 
 
-@compiled("float64[::1], float64[::1], float64[::1], float64, float64, float64")
+@compiled(AnchorEnds, DepthNoise)
 def _with_sigma(
-    depth_m: FloatArray,
-    far_m: FloatArray,
-    depth_samples: FloatArray,
-    unseen_m: float,
-    floor_m: float,
-    quadratic_per_m: float,
+    anchor: AnchorEnds, noise: DepthNoise
 ) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.bool_], NDArray[np.bool_]]:
     """The fields of AnchorDepths."""
-    count = len(depth_m)
-    near, sigma, far = np.full(count, unseen_m), np.full(count, _UNSEEN_SIGMA_M), np.full(count, unseen_m)
-    known, mixed = np.isfinite(depth_m), np.zeros(count, np.bool_)
+    count = len(anchor.depth_m)
+    near, sigma, far = np.full(count, UNSEEN_M), np.full(count, _UNSEEN_SIGMA_M), np.full(count, UNSEEN_M)
+    known, mixed = np.isfinite(anchor.depth_m), np.zeros(count, np.bool_)
     for k in range(count):
         if known[k]:
-            near[k], far[k] = depth_m[k], far_m[k]
-            single = depth_sigma_of(depth_m[k], floor_m, quadratic_per_m)
+            near[k], far[k] = anchor.depth_m[k], anchor.far_m[k]
+            single = depth_sigma_of(near[k], noise.floor_m, noise.quadratic_per_m)
             # The noise of a mean over these frames, part of which they have in common.
-            sigma[k] = single * max(1.0 / math.sqrt(max(depth_samples[k], 1.0)), _COMMON_NOISE)
+            sigma[k] = single * max(1.0 / math.sqrt(max(anchor.depth_samples[k], 1.0)), _COMMON_NOISE)
             mixed[k] = far[k] - near[k] > 0.1 + _MIXED_SIGMAS * single
     return near, sigma, far, known, mixed
 
 
-@compiled(
-    "float64[:, ::1], float64[:, ::1], float64[::1], float64[::1], float64[::1], bool[::1], bool[::1],"
-    " float64"
-)
+@compiled(AnchorEnds, AnchorDepths, "bool[:], float64")
 def _static(
-    direction: FloatArray,
-    origin: FloatArray,
-    near_m: FloatArray,
-    sigma_m: FloatArray,
-    far_m: FloatArray,
-    mixed: NDArray[np.bool_],
-    moving: NDArray[np.bool_],
-    distant_m: float,
+    anchor: AnchorEnds, depths: AnchorDepths, moving: NDArray[np.bool_], distant_m: float
 ) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
     """points_m, depth_sigma_m and usable of Anchors."""
-    count = len(near_m)
-    points_m, depth_sigma_m, usable = np.empty((count, 3)), sigma_m.copy(), np.empty(count, np.bool_)
+    count = len(depths.near_m)
+    points_m, sigma_m, usable = np.empty((count, 3)), depths.sigma_m.copy(), np.empty(count, np.bool_)
     for k in range(count):
+        near_m, far_m, mixed = depths.near_m[k], depths.far_m[k], depths.mixed[k]
         for i in range(3):
-            points_m[k, i] = direction[i, k] * near_m[k] + origin[i, k]
-        distant = mixed[k] and far_m[k] > distant_m
+            points_m[k, i] = anchor.direction[i, k] * near_m + anchor.origin[i, k]
+        distant = mixed and far_m > distant_m
         if distant:
-            depth_sigma_m[k] = max(sigma_m[k], far_m[k] - near_m[k])
-        usable[k] = (distant or not mixed[k]) and not moving[k // 2]
-    return points_m, depth_sigma_m, usable
+            sigma_m[k] = max(sigma_m[k], far_m - near_m)
+        usable[k] = (distant or not mixed) and not moving[k // 2]
+    return points_m, sigma_m, usable
 
 
-@compiled(
-    "float64[:, ::1], float64[:, ::1], float64[::1], float32[:, ::1], float32[:, ::1], float64[:, ::1],"
-    " float64[::1], float64, float64"
-)
+@compiled(AnchorEnds, "float32[:, :], float32[:, :]", Pose, DepthNoise)
 def _averaged(
-    direction: FloatArray,
-    origin: FloatArray,
-    depth_m: FloatArray,
+    before: AnchorEnds,
     near_m: NDArray[np.float32],
     depth_samples: NDArray[np.float32],
-    rotation: FloatArray,
-    translation_m: FloatArray,
-    floor_m: float,
-    quadratic_per_m: float,
+    pose: Pose,
+    noise: DepthNoise,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """depth_m and depth_samples (N, 2) of the store after average_depth."""
     mean_m, new_samples = near_m.copy(), np.ones_like(depth_samples)
-    for k in range(len(depth_m)):
+    for k in range(len(before.depth_m)):
         predicted_m = 0.0
         for i in range(3):
-            predicted_m += rotation[i, 2] * (direction[i, k] * depth_m[k] + origin[i, k] - translation_m[i])
+            there_m = before.direction[i, k] * before.depth_m[k] + before.origin[i, k]
+            predicted_m += pose.rotation[i, 2] * (there_m - pose.translation_m[i])
         fragment, end = k // 2, k % 2
         off_m = near_m[fragment, end] - predicted_m
         # False where either depth is missing (NaN).
-        if abs(off_m) <= 0.05 + 3.0 * depth_sigma_of(predicted_m, floor_m, quadratic_per_m):
+        if abs(off_m) <= 0.05 + 3.0 * depth_sigma_of(predicted_m, noise.floor_m, noise.quadratic_per_m):
             new_samples[fragment, end] = min(depth_samples[fragment, end] + 1.0, _MAX_SAMPLES)
             mean_m[fragment, end] = predicted_m + off_m / new_samples[fragment, end]
     return mean_m, new_samples
 
 
-@compiled(
-    "float64[:, ::1], float64[::1], float32[:, ::1], float64[::1], int64[::1], float64[::1], float64, float64"
-)
+@compiled(AnchorEnds, AnchorDepths, "float64[:, ::1], float32[:, :]", DepthNoise)
 def _steps(
+    anchor: AnchorEnds,
+    depths: AnchorDepths,
     static_m: FloatArray,
-    sigma_m: FloatArray,
     near_m: NDArray[np.float32],
-    depth_samples: FloatArray,
-    lag_frames: NDArray[np.intp],
-    lag_s: FloatArray,
-    floor_m: float,
-    quadratic_per_m: float,
+    noise: DepthNoise,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """depth_step_m, depth_step_sigma_m and depth_lag_s of EndResiduals."""
     count = len(static_m)
     step_m, step_sigma_m, step_lag_s = np.empty(count), np.empty(count), np.empty(count)
     for k in range(count):
-        fragment = k // 2
+        fragment, sigma_m, samples = k // 2, depths.sigma_m[k], anchor.depth_samples[k]
         now_m = np.float64(near_m[fragment, k % 2])
         step_m[k] = now_m - static_m[k, 2]
-        sigma_now_m = depth_sigma_of(1.0 if math.isnan(now_m) else now_m, floor_m, quadratic_per_m)
-        step_sigma_m[k] = math.sqrt(sigma_m[k] * sigma_m[k] + sigma_now_m * sigma_now_m)
+        known_m = 1.0 if math.isnan(now_m) else now_m
+        sigma_now_m = depth_sigma_of(known_m, noise.floor_m, noise.quadratic_per_m)
+        step_sigma_m[k] = math.sqrt(sigma_m * sigma_m + sigma_now_m * sigma_now_m)
         # The averaged depth of the anchor was measured before the anchor's time, on average.
-        late_frames = (
-            0.5 * (depth_samples[k] - 1.0) if depth_samples[k] < _MAX_SAMPLES else _SETTLED_LATE_FRAMES
-        )
-        step_lag_s[k] = lag_s[fragment] + late_frames * (lag_s[fragment] / lag_frames[fragment])
+        late_frames = 0.5 * (samples - 1.0) if samples < _MAX_SAMPLES else _SETTLED_LATE_FRAMES
+        lag_s = anchor.lag_s[fragment]
+        step_lag_s[k] = lag_s + late_frames * (lag_s / anchor.lag_frames[fragment])
     return step_m, step_sigma_m, step_lag_s

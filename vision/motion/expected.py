@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from hal.compiled import compiled
 from hal.types import FloatArray, Intrinsics, Pose
 from vision.fragments.store import FragmentStore
+from vision.numerics.pose_axes import inner_vector
 from vision.scene import Fragments
 
 _UNKNOWN_M = 5.0  # assumed where depth is missing
@@ -39,17 +40,7 @@ def expected_px(
 
     velocity_mps (N, 3): of the fragments over ground, in the camera's axes of the frame before.
     """
-    return _expected_px(
-        np.ascontiguousarray(store.ends_px),
-        np.ascontiguousarray(store.near_m),
-        velocity_mps * dt_s,
-        np.ascontiguousarray(motion.rotation),
-        np.ascontiguousarray(motion.translation_m),
-        camera.fx,
-        camera.fy,
-        camera.cx,
-        camera.cy,
-    )
+    return _expected_px(store.ends_px, store.near_m, velocity_mps * dt_s, motion, camera)
 
 
 @compiled("int64[::1], int64[::1], bool[::1], float64[:, ::1]")
@@ -76,24 +67,18 @@ def _known_motion(
     return moving, result
 
 
-@compiled(
-    "float32[:, :, ::1], float32[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], float64, float64,"
-    " float64, float64"
-)
+@compiled("float32[:, :, :], float32[:, :], float64[:, :]", Pose, Intrinsics)
 def _expected_px(
     ends_px: NDArray[np.float32],
     near_m: NDArray[np.float32],
     displacement_m: FloatArray,
-    rotation: FloatArray,
-    translation_m: FloatArray,
-    fx: float,
-    fy: float,
-    cx: float,
-    cy: float,
+    motion: Pose,
+    camera: Intrinsics,
 ) -> NDArray[np.float32]:
-    """As expected_px. displacement_m (N, 3): of the fragments; rotation, translation_m: of the camera."""
+    """As expected_px. displacement_m (N, 3): of the fragments; motion: of the camera."""
     result = np.empty((2 * len(ends_px), 2), np.float32)
-    point, moved = np.empty(3), np.empty(3)
+    point = np.empty(3)
+    fx, fy, cx, cy = camera.fx, camera.fy, camera.cx, camera.cy
     for k in range(2 * len(ends_px)):
         fragment, end = k // 2, k % 2
         measured_m = near_m[fragment, end]
@@ -102,11 +87,9 @@ def _expected_px(
         point[0] = depth_m * ((ends_px[fragment, end, 0] - np.float32(cx)) / np.float32(fx))
         point[1] = depth_m * ((ends_px[fragment, end, 1] - np.float32(cy)) / np.float32(fy))
         point[2] = depth_m
-        moved[:] = 0.0
         for i in range(3):
-            away_m = point[i] - translation_m[i] + displacement_m[fragment, i]
-            for j in range(3):
-                moved[j] += rotation[i, j] * away_m
-        inverse = 1.0 / max(moved[2], _MIN_AHEAD_M)
-        result[k, 0], result[k, 1] = moved[0] * inverse * fx + cx, moved[1] * inverse * fy + cy
+            point[i] = point[i] - motion.translation_m[i] + displacement_m[fragment, i]
+        x, y, z = inner_vector(motion, point)
+        inverse = 1.0 / max(z, _MIN_AHEAD_M)
+        result[k, 0], result[k, 1] = x * inverse * fx + cx, y * inverse * fy + cy
     return result

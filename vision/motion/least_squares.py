@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.compiled import compiled, inlined
-from hal.types import FloatArray
+from hal.types import FloatArray, Matrices, Matrix
 from vision.motion.velocities import EndResiduals, normal_equations
 
 _ROBUST_CHI2 = 9.0  # 99 % of ends that move with the body, 2 degrees of freedom; others lose their weight
@@ -52,21 +52,15 @@ class FragmentVelocities:
     not usable. velocity_mps (N, 3): over ground. covariance (N, 3, 3).
     """
 
-    per_end: FloatArray
-    velocity_mps: FloatArray
-    covariance: FloatArray
+    per_end: Matrix
+    velocity_mps: Matrix
+    covariance: Matrices
 
 
 def fragment_velocities(motion: EndResiduals, max_speed_mps: float) -> FragmentVelocities:
     """Weighted least squares over the two ends of each fragment."""
-    per_end, velocity_mps, covariance = _fragments(
-        normal_equations(motion, motion.usable.astype(float)),
-        np.ascontiguousarray(motion.usable),
-        np.ascontiguousarray(motion.depth_step_m),
-        np.ascontiguousarray(motion.depth_step_sigma_m),
-        np.ascontiguousarray(motion.depth_lag_s),
-        max_speed_mps,
-    )
+    equations = normal_equations(motion, motion.usable.astype(float))
+    per_end, velocity_mps, covariance = _fragments(motion, equations, max_speed_mps)
     return FragmentVelocities(per_end, velocity_mps, covariance)
 
 
@@ -87,17 +81,7 @@ def body_velocities(
         np.ascontiguousarray(owner, np.int64), np.ascontiguousarray(motion.usable), bodies
     )
     velocity_mps, covariance, agreement, contradicts_static = _bodies(
-        first,
-        members,
-        np.ascontiguousarray(motion.ray),
-        np.ascontiguousarray(motion.lag_s),
-        np.ascontiguousarray(motion.residual_m),
-        np.ascontiguousarray(motion.covariance),
-        np.ascontiguousarray(motion.depth_effect),
-        np.ascontiguousarray(motion.static_chi2),
-        np.ascontiguousarray(per_end),
-        np.ascontiguousarray(start_mps),
-        max_speed_mps,
+        first, members, motion, per_end, start_mps, max_speed_mps
     )
     return BodyVelocities(velocity_mps, covariance, np.diff(first), agreement, contradicts_static)
 
@@ -131,24 +115,20 @@ def _solve(sums: FloatArray, max_speed_mps: float, velocity_mps: FloatArray, cov
     covariance[1, 2] = covariance[2, 1] = c12 + y * z
 
 
-@compiled("float64[:, ::1], bool[::1], float64[::1], float64[::1], float64[::1], float64")
+@compiled(EndResiduals, "float64[:, ::1], float64")
 def _fragments(
-    equations: FloatArray,
-    usable: NDArray[np.bool_],
-    step_m: FloatArray,
-    sigma_m: FloatArray,
-    lag_s: FloatArray,
-    max_speed_mps: float,
+    motion: EndResiduals, equations: FloatArray, max_speed_mps: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """The fields of FragmentVelocities. equations (12, 2N): see normal_equations."""
-    ends = len(usable)
+    ends = len(motion.usable)
     per_end = np.zeros((14, ends))
     per_end[:12] = equations
     for k in range(ends):
-        if usable[k] and not np.isnan(step_m[k]):
-            root = lag_s[k] / sigma_m[k]
+        step_m, sigma_m = motion.depth_step_m[k], motion.depth_step_sigma_m[k]
+        if motion.usable[k] and not np.isnan(step_m):
+            root = motion.depth_lag_s[k] / sigma_m
             per_end[12, k] = root * root
-            per_end[13, k] = root * (step_m[k] / sigma_m[k])
+            per_end[13, k] = root * (step_m / sigma_m)
     velocity_mps, covariance = np.empty((ends // 2, 3)), np.empty((ends // 2, 3, 3))
     sums = np.empty(14)
     for k in range(ends // 2):
@@ -228,10 +208,9 @@ def _information(covariance: FloatArray, effect: FloatArray, result: FloatArray)
 
 
 @inlined
-def _chi2(
-    velocity_mps: FloatArray, ray: FloatArray, lag_s: float, residual_m: FloatArray, information: FloatArray
-) -> float:
-    """Chi-square of an end with this information (3,) under the hypothesis of velocity (3,)."""
+def _chi2(motion: EndResiduals, k: int, velocity_mps: FloatArray, information: FloatArray) -> float:
+    """Chi-square of end k with this information (3,) under the hypothesis of velocity (3,)."""
+    ray, residual_m, lag_s = motion.ray[k], motion.residual_m[k], motion.lag_s[k]
     a = residual_m[0] - lag_s * (velocity_mps[0] - ray[0] * velocity_mps[2])
     b = residual_m[1] - lag_s * (velocity_mps[1] - ray[1] * velocity_mps[2])
     result: float = (information[0] * a + information[1] * b) * a + (
@@ -240,34 +219,25 @@ def _chi2(
     return result
 
 
-@compiled(
-    "int64[::1], int64[::1], float64[:, ::1], float64[::1], float64[:, ::1], float64[:, ::1],"
-    " float64[:, ::1], float64[::1], float64[:, ::1], float64[:, ::1], float64"
-)
+@compiled("int64[::1], int64[::1]", EndResiduals, "float64[:, :], float64[:, :], float64")
 def _bodies(
     first: NDArray[np.intp],
     members: NDArray[np.intp],
-    ray: FloatArray,
-    lag_s: FloatArray,
-    residual_m: FloatArray,
-    covariance: FloatArray,
-    depth_effect: FloatArray,
-    static_chi2: FloatArray,
+    motion: EndResiduals,
     per_end: FloatArray,
     start_mps: FloatArray,
     max_speed_mps: float,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """velocity_mps, covariance, agreement and contradicts_static of BodyVelocities.
 
-    first, members: see _grouped. per_end, start_mps, max_speed_mps: see body_velocities. The others: see
-    EndResiduals.
+    first, members: see _grouped. per_end, start_mps, max_speed_mps: see body_velocities.
     """
     bodies = len(first) - 1
     velocity_mps, spread_out = start_mps.copy(), np.empty((bodies, 3, 3))
     agreement, contradicts_static = np.zeros(bodies), np.zeros(bodies)
-    information, sums = np.empty((len(lag_s), 3)), np.empty(14)
+    information, sums = np.empty((len(motion.lag_s), 3)), np.empty(14)
     for k in members:
-        _information(covariance[k], depth_effect[k], information[k])
+        _information(motion.covariance[k], motion.depth_effect[k], information[k])
     for g in range(bodies):
         own = members[first[g] : first[g + 1]]
         ends = len(own)
@@ -276,7 +246,7 @@ def _bodies(
         for scale in _ANNEAL:
             for j in range(ends):
                 k = own[j]
-                chi2[j] = _chi2(velocity_mps[g], ray[k], lag_s[k], residual_m[k], information[k])
+                chi2[j] = _chi2(motion, k, velocity_mps[g], information[k])
             admitted = scale * _ROBUST_CHI2 * _spread(chi2)
             sums[:] = 0.0
             for j in range(ends):
@@ -287,9 +257,9 @@ def _bodies(
             _solve(sums, max_speed_mps, velocity_mps[g], spread_out[g])
         for j in range(ends):
             k = own[j]
-            chi2[j] = _chi2(velocity_mps[g], ray[k], lag_s[k], residual_m[k], information[k])
+            chi2[j] = _chi2(motion, k, velocity_mps[g], information[k])
             agreement[g] += chi2[j] <= _ROBUST_CHI2
-            contradicts_static[g] += static_chi2[k] > _MOVED_CHI2
+            contradicts_static[g] += motion.static_chi2[k] > _MOVED_CHI2
         agreement[g] /= max(ends, 1)
         contradicts_static[g] /= max(ends, 1)
         # Motion that the model does not explain (limbs, rotation, sliding) increases the covariance.

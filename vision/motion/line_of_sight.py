@@ -11,10 +11,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hal.compiled import compiled, inlined
-from hal.types import FloatArray
+from hal.types import Flags, FloatArray
 
 _FLOOR_SIGMA_MPS = 0.03  # added sigma: error of the camera's own motion, which no filter models
 _CONTRADICTION_SIGMAS = 2.5  # 99 % of equal velocities differ by less
@@ -175,10 +174,10 @@ def _parts(
 class SecondOpinion:
     """Whether the surface's velocity denies or confirms the fragments', along and across: (T,) each."""
 
-    denies_along: NDArray[np.bool_]
-    denies_across: NDArray[np.bool_]
-    confirms_along: NDArray[np.bool_]
-    confirms_across: NDArray[np.bool_]
+    denies_along: Flags
+    denies_across: Flags
+    confirms_along: Flags
+    confirms_across: Flags
 
 
 def second_opinion(fragments: Split, surface: Split, apart: Split) -> SecondOpinion:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import DepthNoise
-from hal.types import FloatArray
+from hal.types import Flags, FloatArray, Integers, Matrices, Matrix, Vector
 from vision.bodies import sightings
 from vision.bodies.tracks import Tracks
 from vision.depth.depth_noise import depth_sigma_m
@@ -51,28 +51,28 @@ class MotionEvidence:
     borne_out: how well the fragments support it, 0..1.
     """
 
-    sight: FloatArray
-    distance_m: FloatArray
-    depth_sigma_m: FloatArray
-    velocity: FloatArray
-    covariance: FloatArray
-    own_velocity: FloatArray
-    own_covariance: FloatArray
-    surface_velocity: FloatArray
-    surface_covariance: FloatArray
-    ends: NDArray[np.intp]
-    agreement: FloatArray
-    restless: NDArray[np.bool_]
-    restless_s: FloatArray
-    arrived: NDArray[np.intp]
-    arriving_s: FloatArray
-    cells: NDArray[np.intp]
-    size_m: FloatArray
-    velocity_measured_s: FloatArray
-    view_radps: FloatArray
-    growth_mps: FloatArray
-    advances: NDArray[np.bool_]
-    border_is_guess: NDArray[np.bool_]
+    sight: Matrix
+    distance_m: Vector
+    depth_sigma_m: Vector
+    velocity: Matrix
+    covariance: Matrices
+    own_velocity: Matrix
+    own_covariance: Matrices
+    surface_velocity: Matrix
+    surface_covariance: Matrices
+    ends: Integers
+    agreement: Vector
+    restless: Flags
+    restless_s: Vector
+    arrived: Integers
+    arriving_s: Vector
+    cells: Integers
+    size_m: Vector
+    velocity_measured_s: Vector
+    view_radps: Vector
+    growth_mps: Vector
+    advances: Flags
+    border_is_guess: Flags
     up: FloatArray | None
     trusted: bool
     reckoned: bool

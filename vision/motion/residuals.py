@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from config.perception import DepthNoise
 from hal.compiled import compiled, inlined
-from hal.types import FloatArray, Intrinsics
+from hal.types import FloatArray, Intrinsics, Pose
 from vision.depth.depth_noise import depth_sigma_of
 from vision.ego_motion.camera_motion import CameraEstimate
 from vision.ego_motion.rolling_shutter import straight_rays
@@ -25,6 +25,7 @@ from vision.fragments.store import AnchorEnds, FragmentStore
 from vision.motion.anchor_depths import AnchorDepths, depth_steps
 from vision.motion.velocities import STATIC_END_CHI2, EndResiduals
 from vision.numerics.order import quantile
+from vision.numerics.pose_axes import inner_point, inner_vector
 
 _SETTLED_FRAMES = 3  # the residuals of younger ends are hardly larger than their noise
 _MIN_ENDS = 16  # minimum for a scale: it is taken from the lower third
@@ -53,24 +54,16 @@ def residuals(
     """
     variance = now.covariance.diagonal().tolist()
     static_m, ray, residual_m, covariance, depth_effect, static_chi2, usable = _residuals(
-        np.ascontiguousarray(anchor.direction),
-        np.ascontiguousarray(anchor.origin),
-        depths.near_m,
-        depths.sigma_m,
-        depths.far_m,
-        depths.mixed,
-        np.ascontiguousarray(straight_rays(store.ends_px.reshape(-1, 2), camera, now.sweep_rad).T),
-        np.ascontiguousarray(store.ends_px),
-        np.ascontiguousarray(store.pixel_cov),
-        anchor.lag_frames,
-        np.ascontiguousarray(now.pose.rotation),
-        np.ascontiguousarray(now.pose.translation_m),
+        anchor,
+        depths,
+        straight_rays(store.ends_px.reshape(-1, 2), camera, now.sweep_rad),
+        store.ends_px,
+        store.pixel_cov,
+        now.pose,
         max(variance[:3]),
         max(variance[3:6]),
-        camera.fx,
-        camera.fy,
-        noise.floor_m,
-        noise.quadratic_per_m,
+        camera,
+        noise,
         variance_scale,
     )
     step_m, step_sigma_m, step_lag_s = depth_steps(store, anchor, depths, static_m, noise)
@@ -138,73 +131,52 @@ def _sliding_covariance(
     return slide * du * du + rest, slide * du * dv, slide * dv * dv + rest
 
 
-@inlined
-def _camera_axes(
-    rotation: FloatArray,
-    translation_m: FloatArray,
-    direction: FloatArray,
-    origin: FloatArray,
-) -> tuple[float, float, float, float, float, float]:
-    """A direction (3,) and an origin (3,) of the fixed frame in the axes of the camera with this pose."""
-    dx, dy, dz, x, y, z = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for i in range(3):
-        along, away = direction[i], origin[i] - translation_m[i]
-        dx += rotation[i, 0] * along
-        dy += rotation[i, 1] * along
-        dz += rotation[i, 2] * along
-        x += rotation[i, 0] * away
-        y += rotation[i, 1] * away
-        z += rotation[i, 2] * away
-    return dx, dy, dz, x, y, z
-
-
 @compiled(
-    "float64[:, ::1], float64[:, ::1], float64[::1], float64[::1], float64[::1], bool[::1], float64[:, ::1],"
-    " float32[:, :, ::1], float32[:, :, ::1], int64[::1], float64[:, ::1], float64[::1], float64, float64,"
-    " float64, float64, float64, float64, float64"
+    AnchorEnds,
+    AnchorDepths,
+    "float64[:, :], float32[:, :, :], float32[:, :, :]",
+    Pose,
+    "float64, float64",
+    Intrinsics,
+    DepthNoise,
+    "float64",
 )
 def _residuals(
-    direction: FloatArray,
-    origin: FloatArray,
-    near_m: FloatArray,
-    sigma_m: FloatArray,
-    far_m: FloatArray,
-    mixed: NDArray[np.bool_],
+    anchor: AnchorEnds,
+    depths: AnchorDepths,
     straight: FloatArray,
     ends_px: NDArray[np.float32],
     pixel_cov: NDArray[np.float32],
-    lag_frames: NDArray[np.intp],
-    rotation: FloatArray,
-    translation_m: FloatArray,
+    pose: Pose,
     turn_variance: float,
     way_variance: float,
-    fx: float,
-    fy: float,
-    floor_m: float,
-    quadratic_per_m: float,
+    camera: Intrinsics,
+    noise: DepthNoise,
     variance_scale: float,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, NDArray[np.bool_]]:
     """static_m, ray, residual_m, covariance, depth_effect and static_chi2 of EndResiduals, and which are
     usable.
 
-    straight (3, 2N): rays to the ends as seen now. turn_variance, way_variance: of the camera's rotation
-    (rad^2) and translation (m^2).
+    straight (2N, 3): rays to the ends as seen now. pose: of the camera. turn_variance, way_variance: of its
+    rotation (rad^2) and translation (m^2).
     """
-    count = len(near_m)
+    count, fx, fy = len(depths.near_m), camera.fx, camera.fy
     static_m, ray, residual_m = np.empty((count, 3)), np.empty((count, 2)), np.empty((count, 2))
     covariance, effect, chi2 = np.empty((count, 3)), np.empty((count, 2)), np.empty(count)
-    usable, noise = np.empty(count, np.bool_), math.sqrt(variance_scale)
+    usable, noise_scale = np.empty(count, np.bool_), math.sqrt(variance_scale)
     for k in range(count):
-        dx, dy, dz, x0, y0, z0 = _camera_axes(rotation, translation_m, direction[:, k], origin[:, k])
-        u, v = straight[0, k], straight[1, k]
+        dx, dy, dz = inner_vector(pose, anchor.direction[:, k])
+        x0, y0, z0 = inner_point(pose, anchor.origin[:, k])
+        u, v = straight[k, 0], straight[k, 1]
+        near_m, far_m = depths.near_m[k], depths.far_m[k]
         # Where a static end would be now if it is on the near surface, and if it is on the far one.
-        x, y, z = dx * near_m[k] + x0, dy * near_m[k] + y0, dz * near_m[k] + z0
-        far_x, far_y, far_z = dx * far_m[k] + x0, dy * far_m[k] + y0, dz * far_m[k] + z0
+        x, y, z = dx * near_m + x0, dy * near_m + y0, dz * near_m + z0
+        far_x, far_y, far_z = dx * far_m + x0, dy * far_m + y0, dz * far_m + z0
         ahead, far_ahead = max(z, 0.1), max(far_z, 0.1)
         uu, uv, vv = pixel_cov[k // 2, k % 2]
-        steps = max(1.0, _STEPS_SHARE * lag_frames[k // 2])
+        steps = max(1.0, _STEPS_SHARE * anchor.lag_frames[k // 2])
         uu, uv, vv = uu * steps, uv * steps, vv * steps
-        if mixed[k]:
+        if depths.mixed[k]:
             passing = (far_x / far_ahead - x / ahead) * fx, (far_y / far_ahead - y / ahead) * fy
             more_uu, more_uv, more_vv = _sliding_covariance(ends_px[k // 2], passing)
             uu, uv, vv = uu + more_uu, uv + more_uv, vv + more_vv
@@ -215,11 +187,11 @@ def _residuals(
             uv * scaled / (fx * fy),
             vv * scaled / (fy * fy) + pose_variance,
         )
-        turn_u, turn_v = (u * dz - dx) * noise, (v * dz - dy) * noise
-        near_effect = turn_u * sigma_m[k], turn_v * sigma_m[k]
+        turn_u, turn_v = (u * dz - dx) * noise_scale, (v * dz - dy) * noise_scale
+        near_effect = turn_u * depths.sigma_m[k], turn_v * depths.sigma_m[k]
         near_residual = u * z - x, v * z - y
         near_chi2 = _squared_sigmas(near_residual, (xx, xy, yy), near_effect)
-        far_sigma_m = depth_sigma_of(far_m[k], floor_m, quadratic_per_m)
+        far_sigma_m = depth_sigma_of(far_m, noise.floor_m, noise.quadratic_per_m)
         more = (far_z / ahead) ** 2
         far_chi2 = _squared_sigmas(
             (u * far_z - far_x, v * far_z - far_y),

@@ -17,10 +17,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hal.compiled import compiled
-from hal.types import FloatArray
+from hal.types import Flags, FloatArray, Matrix, Vector
 
 STATIC_END_CHI2 = 6.0  # of static_chi2: 95 % of static ends lie below; 2 degrees of freedom
 _MIN_DETERMINANT = 1e-18  # m^4, of a covariance: a lower bound that avoids a division by 0
@@ -44,17 +43,17 @@ class EndResiduals:
     usable: none of the others but depth_step_m is NaN where this is true, (N,).
     """
 
-    static_m: FloatArray
-    ray: FloatArray
-    lag_s: FloatArray
-    residual_m: FloatArray
-    covariance: FloatArray
-    depth_effect: FloatArray
-    depth_step_m: FloatArray
-    depth_step_sigma_m: FloatArray
-    depth_lag_s: FloatArray
-    static_chi2: FloatArray
-    usable: NDArray[np.bool_]
+    static_m: Matrix
+    ray: Matrix
+    lag_s: Vector
+    residual_m: Matrix
+    covariance: Matrix
+    depth_effect: Matrix
+    depth_step_m: Vector
+    depth_step_sigma_m: Vector
+    depth_lag_s: Vector
+    static_chi2: Vector
+    usable: Flags
 
 
 def normal_equations(motion: EndResiduals, weight: FloatArray) -> FloatArray:
@@ -64,43 +63,30 @@ def normal_equations(motion: EndResiduals, weight: FloatArray) -> FloatArray:
     entries 00, 01, 02, 11, 12, 22 of the symmetric matrix. Rows 6 to 8: right-hand side. Rows 9 to 11:
     right-hand side for one sigma of a depth error common to all points of a body.
     """
-    return _equations(
-        np.ascontiguousarray(motion.ray),
-        np.ascontiguousarray(motion.lag_s),
-        np.ascontiguousarray(motion.residual_m),
-        np.ascontiguousarray(motion.covariance),
-        np.ascontiguousarray(motion.depth_effect),
-        np.ascontiguousarray(weight),
-    )
+    return _equations(motion, weight)
 
 
-@compiled("float64[:, ::1], float64[::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1]")
-def _equations(
-    ray: FloatArray,
-    lag_s: FloatArray,
-    residual_m: FloatArray,
-    covariance: FloatArray,
-    depth_effect: FloatArray,
-    weight: FloatArray,
-) -> FloatArray:
+@compiled(EndResiduals, "float64[:]")
+def _equations(motion: EndResiduals, weight: FloatArray) -> FloatArray:
     """As normal_equations. Zero where weight is zero, even if other inputs are NaN there."""
     table = np.zeros((12, len(weight)))
     for k in range(len(weight)):
         if weight[k] == 0.0:
             continue
-        xx, xy, yy = covariance[k]
-        scale = weight[k] * lag_s[k] / max(xx * yy - xy * xy, _MIN_DETERMINANT)
+        lag_s = motion.lag_s[k]
+        xx, xy, yy = motion.covariance[k]
+        scale = weight[k] * lag_s / max(xx * yy - xy * xy, _MIN_DETERMINANT)
         pxx, pxy, pyy = yy * scale, -xy * scale, xx * scale
-        x, y = ray[k]
+        x, y = motion.ray[k]
         # Rows (1, 0, -x') T and (0, 1, -y') T with information [[pxx, pxy], [pxy, pyy]].
         qx, qy = -(pxx * x + pxy * y), -(pxy * x + pyy * y)
-        table[0, k] = pxx * lag_s[k]
-        table[1, k] = pxy * lag_s[k]
-        table[2, k] = qx * lag_s[k]
-        table[3, k] = pyy * lag_s[k]
-        table[4, k] = qy * lag_s[k]
-        table[5, k] = -(qx * x + qy * y) * lag_s[k]
-        for row, vector in ((6, residual_m[k]), (9, depth_effect[k])):
+        table[0, k] = pxx * lag_s
+        table[1, k] = pxy * lag_s
+        table[2, k] = qx * lag_s
+        table[3, k] = pyy * lag_s
+        table[4, k] = qy * lag_s
+        table[5, k] = -(qx * x + qy * y) * lag_s
+        for row, vector in ((6, motion.residual_m[k]), (9, motion.depth_effect[k])):
             a, b = vector
             table[row, k] = pxx * a + pxy * b
             table[row + 1, k] = pxy * a + pyy * b

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hal.compiled import inlined
-from hal.types import FloatArray
+from hal.types import Pose
 
 NEAREST_M = np.float32(0.1)  # the projection of a nearer point is meaningless
 # One row of the relative transform: three entries of the rotation, and the translation in metres.
@@ -13,20 +13,14 @@ Row = tuple[np.float32, np.float32, np.float32, np.float32]
 
 
 @inlined
-def relative_row(
-    to_rotation: FloatArray,
-    to_origin_m: FloatArray,
-    from_rotation: FloatArray,
-    from_origin_m: FloatArray,
-    axis: int,
-) -> Row:
-    """The row of the transform between two poses that gives the coordinate along axis of the to-pose."""
+def relative_row(to: Pose, of: Pose, axis: int) -> Row:
+    """The row of the transform between the axes of two poses that gives the coordinate along axis of to."""
     x, y, z, shift_m = 0.0, 0.0, 0.0, 0.0
     for i in range(3):
-        along = to_rotation[i, axis]
-        x, y = x + along * from_rotation[i, 0], y + along * from_rotation[i, 1]
-        z += along * from_rotation[i, 2]
-        shift_m += along * (from_origin_m[i] - to_origin_m[i])
+        along = to.rotation[i, axis]
+        x, y = x + along * of.rotation[i, 0], y + along * of.rotation[i, 1]
+        z += along * of.rotation[i, 2]
+        shift_m += along * (of.translation_m[i] - to.translation_m[i])
     return np.float32(x), np.float32(y), np.float32(z), np.float32(shift_m)
 
 

@@ -35,7 +35,7 @@ def test_the_file_that_ships_loads_and_says_every_default() -> None:
         ({"input": {"kind": "unix", "path": "a\0b"}}, "cannot hold a NUL"),
     ],
 )
-def test_what_is_wrong_is_named(tmp_path: Path, governor: object, complaint: str) -> None:
+def test_config_error_names_the_wrong_setting(tmp_path: Path, governor: object, complaint: str) -> None:
     with pytest.raises(ConfigError) as error:
         loaded(tmp_path, governor=governor)
     assert complaint in str(error.value)

@@ -52,7 +52,7 @@ def test_another_kind_has_other_keys(tmp_path: Path) -> None:
     assert said == "chassis.watchdog: unknown key; did you mean watchdog_ms?"
 
 
-def test_what_is_known_is_said_once(tmp_path: Path) -> None:
+def test_known_keys_are_listed_once(tmp_path: Path) -> None:
     path = tmp_path / "other.yaml"
     path.write_text("abc: 1\nxyz: 2\n")
     with pytest.raises(ConfigError) as caught:

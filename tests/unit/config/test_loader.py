@@ -46,7 +46,7 @@ def test_a_good_file_is_read(tmp_path: Path) -> None:
     assert config == Outer(count=3, inner=Inner(speed_mps=2.0))
 
 
-def test_what_is_merged_in_may_be_given_again(tmp_path: Path) -> None:
+def test_merged_yaml_key_may_be_overridden(tmp_path: Path) -> None:
     config = load(written(tmp_path, "count: 3\ninner: {<<: {speed_mps: 1}, speed_mps: 2}\n"), Outer)
     assert config.inner.speed_mps == 2.0
 

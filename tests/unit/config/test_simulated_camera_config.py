@@ -25,7 +25,7 @@ def test_the_default_is_like_a_d435i() -> None:
         ("zoom", 2.0, "extra"),
     ],
 )
-def test_what_cannot_be_is_refused(key: str, value: object, says: str) -> None:
+def test_impossible_camera_settings_are_refused(key: str, value: object, says: str) -> None:
     with pytest.raises(ValidationError, match=says):
         SimulatedCameraConfig.model_validate({key: value})
 

@@ -38,7 +38,7 @@ def test_every_method_it_names_is_the_driver_s(method: str) -> None:
 
 
 @pytest.mark.parametrize("word", ["command_refusal", "stop_cause", "silence_hint"])
-def test_what_told_asks_for(word: str) -> None:
+def test_page_names_the_fields_of_the_feedback(word: str) -> None:
     assert word in PAGE.quoted
     assert hasattr(ChassisFeedback, word)
 
@@ -98,7 +98,7 @@ def test_a_line_that_has_changed_is_told_with_its_page_and_file() -> None:
     )
 
 
-def test_what_is_pasted_from_the_page_passes_the_checks_and_drives(tmp_path: Path) -> None:
+def test_code_pasted_from_the_page_passes_the_checks_and_drives(tmp_path: Path) -> None:
     PAGE.paste(tmp_path)
     assert not ruff_findings(tmp_path)
     config = yaml.safe_load(read("config/sim.yaml"))

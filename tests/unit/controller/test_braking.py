@@ -201,7 +201,7 @@ def test_speeding_up_is_no_slowing_down() -> None:
 
 
 @pytest.mark.parametrize("unknown", [(math.nan, 0.2, 0.0), (0.5, math.nan, 0.0), (0.5, 0.2, math.nan)])
-def test_what_is_not_known_is_no_distance(unknown: tuple[float, float, float]) -> None:
+def test_unknown_value_gives_no_distance(unknown: tuple[float, float, float]) -> None:
     closing_mps, latency_s, margin_m = unknown
     with pytest.raises(ValueError, match=r"known .*nan"):
         braking.required_distance(1.0, 0.0, closing_mps, latency_s, BrakeLimits(0.7, 2.0), margin_m)

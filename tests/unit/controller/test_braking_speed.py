@@ -99,7 +99,7 @@ def test_no_speed_fits_when_the_obstacle_is_too_near() -> None:
 
 
 @pytest.mark.parametrize("name", ["distance_m", "latency_s", "closing_mps", "margin_m", "a_mps2"])
-def test_what_is_not_known_is_no_speed(name: str) -> None:
+def test_unknown_value_gives_no_speed(name: str) -> None:
     """As stop() refuses it: no comparison with NaN may turn into a speed."""
     given = {"distance_m": 5.0, "latency_s": 0.2, "closing_mps": 0.5, "margin_m": 0.4, "a_mps2": 0.1}
     limits = BrakeLimits(0.7, 2.0)

@@ -59,7 +59,7 @@ def test_the_estimate_stays_within_reason() -> None:
     assert lag.seconds <= 0.6
 
 
-def test_what_was_learnt_while_the_chassis_did_not_follow_is_taken_back() -> None:
+def test_lag_learnt_while_the_chassis_did_not_follow_is_undone() -> None:
     """Of the last two seconds; what was learnt before stays."""
     lag = ChassisLag(0.2)
     drive(lag, 0.1, 0.0)

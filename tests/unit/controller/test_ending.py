@@ -93,7 +93,7 @@ def test_a_base_that_still_moves_has_not_ended_the_drive(told: tuple[float, floa
     assert drive.ending.outcome is (Outcome.REACHED if arrived else Outcome.STOPPED)
 
 
-def test_what_the_base_told_before_it_was_told_to_stand_is_no_evidence_of_rest() -> None:
+def test_feedback_from_before_the_stop_command_is_no_evidence_of_rest() -> None:
     drive = Drive()
     drive.run(1.0, v_mps=0.5, told=(0.0, 0.0))
     assert drive.run(2 * SETTLE_S, arrived=True, told=(0.0, 0.0), heard=False) is None

@@ -58,7 +58,7 @@ def test_the_bounds_are_the_robot_s() -> None:
         (next_to_last(stamp_ns=NOW - 21 * MS), "the command is 1 ms older than the one before"),
     ],
 )
-def test_what_passes_and_what_does_not(setpoint: Setpoint, words: str) -> None:
+def test_guard_objects_to_bad_setpoints_only(setpoint: Setpoint, words: str) -> None:
     said = objection(setpoint, LAST, LIMITS, NOW)
     assert said.startswith(words)
     assert bool(said) is bool(words)
@@ -163,7 +163,7 @@ def test_time_that_runs_backwards_latches() -> None:
         assert "output guard: time runs backwards by 5 ms" in rig.state.reason
 
 
-def test_what_is_not_armed_may_be_asked_for_anything_plausible() -> None:
+def test_guard_accepts_plausible_commands_before_arming() -> None:
     """Nothing of it goes out; the loop's first steps before the base obeys are no violation."""
     with agilex_rig("scripted") as rig:
         rig.chassis = GuardedChassis(rig.chassis, LIMITS)

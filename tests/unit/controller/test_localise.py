@@ -31,7 +31,7 @@ def test_a_pose_between_two_known_ones_is_interpolated_the_short_way_round() -> 
     assert math.degrees(pose.heading_rad) == pytest.approx(-180.0)
 
 
-def test_what_lies_outside_the_history_is_not_known() -> None:
+def test_pose_outside_the_history_is_unknown() -> None:
     history = PoseHistory(reach_s=0.1)
     assert history.at(0) is None
     history.append(1000 * MS, ORIGIN)
@@ -40,7 +40,7 @@ def test_what_lies_outside_the_history_is_not_known() -> None:
     assert history.at(1101 * MS) is None
 
 
-def test_what_moves_goes_on_for_as_long_as_the_last_two_poses_are_apart() -> None:
+def test_pose_is_extrapolated_by_at_most_the_last_interval() -> None:
     """A frame that is exposed between two steps of the control loop is looked at before the second."""
     history = PoseHistory(reach_s=0.1)
     history.append(1000 * MS, ORIGIN)

@@ -45,7 +45,7 @@ def test_arming_sends_the_mode_until_the_base_is_in_it_and_never_again() -> None
         assert bench.sent() == [MotionCommand(0.1, 0.0)]
 
 
-def test_what_waited_in_the_port_is_no_answer_to_the_consent() -> None:
+def test_frames_that_waited_in_the_port_do_not_answer_the_consent() -> None:
     """Frames from before a restart may still say that the base obeys."""
     bench = Bench()
     bench.exchange()
@@ -125,7 +125,7 @@ def test_limits_of_the_model_hold_on_the_wire() -> None:
         (state(mode=9), "no longer obeys: control mode is unknown mode 9"),
     ],
 )
-def test_what_the_base_says_can_latch(said: SystemState, reason: str) -> None:
+def test_state_reported_by_the_base_can_latch(said: SystemState, reason: str) -> None:
     bench = Bench()
     bench.arm()
     bench.exchange(0.5)

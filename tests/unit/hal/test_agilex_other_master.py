@@ -31,7 +31,7 @@ RIVALS: dict[str, AgilexMessage] = {
 
 
 @pytest.mark.parametrize("sentence", RIVALS)
-def test_who_hears_another_master_refuses_to_arm_and_does_not_say_a_word(sentence: str) -> None:
+def test_driver_that_hears_another_master_refuses_to_arm_and_sends_nothing(sentence: str) -> None:
     """A zero or a standby would stop a drive that is somebody else's."""
     bench = Bench()
     bench.deliver(state(CAN), MotionFeedback(0.4, 0.0), RIVALS[sentence])

@@ -99,7 +99,7 @@ def test_a_flood_refuses_the_consent() -> None:
     assert bench.exchange().mode is ChassisMode.ARMING, "it has ended"
 
 
-def test_what_jumped_before_the_consent_does_not_count() -> None:
+def test_odometer_jump_before_the_consent_does_not_count() -> None:
     bench = mini(track_width_m=0.5)
     for millimetres in (50_000, 50_010, 0, 10):
         bench.deliver(MotionFeedback(0.0, 0.0), Odometer(millimetres, millimetres))

@@ -54,7 +54,7 @@ def test_understands_what_was_said(message: AgilexMessage, count: int, data: str
     assert (reader.rejected, reader.foreign_frames) == (0, 0)
 
 
-def test_what_the_serial_line_has_no_word_for_is_not_sent() -> None:
+def test_frame_without_a_serial_form_is_not_sent() -> None:
     assert wrap(CanFrame(0x361, bytes(8)), 0) is None
     link = ScriptedSerialLink()
     AgilexSerialBus(link).send(CanFrame(0x255, bytes(8)))
@@ -164,7 +164,7 @@ def test_arms_in_serial_mode_and_drives() -> None:
         (GOOD, "0x221 came, but no 0x211"),
     ],
 )
-def test_what_came_instead_is_told_when_arming_gives_up(heard: bytes, hint: str) -> None:
+def test_failed_arming_reports_what_was_received_instead(heard: bytes, hint: str) -> None:
     bench = Bench()
     bench.chassis.arm(0)
     for _ in range(160):

@@ -18,7 +18,7 @@ from tests.support.agilex_bench import Bench, state
         ([encode(MotionFeedback(0.0, 0.0))], "0x221 came, but no 0x211"),
     ],
 )
-def test_what_came_instead_is_told_when_arming_gives_up(frames: list[CanFrame], hint: str) -> None:
+def test_failed_arming_reports_what_was_received_instead(frames: list[CanFrame], hint: str) -> None:
     bench = Bench()
     bench.chassis.arm(0)
     for _ in range(160):
@@ -39,7 +39,7 @@ def test_what_came_instead_is_told_when_arming_gives_up(frames: list[CanFrame], 
         (Odometer(0, 0), "0x211 came, but no 0x221"),
     ],
 )
-def test_what_dead_reckoning_lacks_is_told_when_arming_gives_up(heard: AgilexMessage, hint: str) -> None:
+def test_failed_arming_reports_what_dead_reckoning_lacks(heard: AgilexMessage, hint: str) -> None:
     bench = Bench(track_width_m=0.5)
     bench.chassis.arm(0)
     for _ in range(160):

@@ -77,7 +77,7 @@ def test_arms_after_consent_when_the_base_obeys() -> None:
     assert state.may_move
 
 
-def test_what_the_base_said_before_the_consent_does_not_count() -> None:
+def test_messages_from_before_the_consent_do_not_arm() -> None:
     state = consent(Arming(), at(100), LIMITS)
     state = step(state, at(120, status_ns=100 * MS), LIMITS)
     assert state.reason == "arming: no status heard from the base"

@@ -170,7 +170,7 @@ def test_a_lens_with_more_coefficients_than_can_be_straightened_is_refused(tmp_p
     assert read_all(BagReplay(write_bag(tmp_path / "without", "mcap", lambda ros: entries(ros, 0.0))))
 
 
-def test_what_is_straight_already_is_not_straightened_again(tmp_path: Path) -> None:
+def test_rectified_image_is_not_rectified_again(tmp_path: Path) -> None:
     """And it is of the pinhole that it was rectified to."""
     striped = np.zeros((SMALL.height, SMALL.width, 3), np.uint8)
     striped[:, ::4] = 255

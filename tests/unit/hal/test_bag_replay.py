@@ -63,7 +63,7 @@ def test_the_file_inside_the_folder_is_a_bag_as_well(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("file", ["realsense-2.59.db3", "realsense-2.55.bag"])
-def test_what_a_realsense_viewer_records_is_read(file: str) -> None:
+def test_recording_of_the_realsense_viewer_is_read(file: str) -> None:
     """Four frames of librealsense's own recorder: depth from a camera of its own, 3 mm further back."""
     replay = BagReplay(RECORDINGS / file)
     frames = read_all(replay)
@@ -152,7 +152,7 @@ def test_a_bag_without_one_usable_frame_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("of", "told"), [("bag", "is damaged from here on"), ("mcap", "of 40 images cannot be found")]
 )
-def test_what_comes_before_the_damage_is_not_lost_and_what_comes_after_it_is_told(
+def test_frames_before_a_damage_are_read_and_the_loss_after_it_is_reported(
     of: Format, told: str, tmp_path: Path
 ) -> None:
     path = small_bag(tmp_path, of, count=20)
@@ -195,7 +195,7 @@ def test_a_folder_that_was_not_written_to_its_end_is_told_how_to_mend(tmp_path: 
         BagReplay(path)
 
 
-def test_what_is_wrong_with_a_folder_is_told_in_one_line(tmp_path: Path) -> None:
+def test_bad_recording_folder_is_reported_in_one_line(tmp_path: Path) -> None:
     path = small_bag(tmp_path)
     (path / "metadata.yaml").write_text("- [")
     with pytest.raises(BadRecording, match="Could not load YAML") as refused:

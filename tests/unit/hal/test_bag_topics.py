@@ -67,7 +67,7 @@ def test_the_calibration_is_beside_the_images_without_their_transport() -> None:
     assert (found.colour_info, found.depth_info) == ("/camera/rgb/camera_info", "/camera/depth/camera_info")
 
 
-def test_what_is_rectified_and_registered_is_known_by_name() -> None:
+def test_rectified_and_registered_topics_are_known_by_name() -> None:
     found = chosen("/rectangle/rgb/image_rect_color", "/rectangle/depth/image_raw")
     assert (found.rectified, found.depth_rectified, found.says_registered) == (True, False, False)
     assert chosen("/rgb/image_raw", "/depth_registered/image_raw").says_registered

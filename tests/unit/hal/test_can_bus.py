@@ -115,7 +115,7 @@ def test_vendor_errors_are_translated_with_their_cause(
         ("can0", errno.EAFNOSUPPORT, "this kernel has no SocketCAN; try `modprobe can_raw`"),
     ],
 )
-def test_what_to_do_about_a_bus_of_the_system(
+def test_missing_system_bus_error_says_what_to_do(
     monkeypatch: pytest.MonkeyPatch, channel: str, number: int, words: str
 ) -> None:
     def refuse(**options: object) -> None:
@@ -197,7 +197,7 @@ def test_bus_off_is_a_lost_link(bus: FaultyBus) -> None:
         link.receive()
 
 
-def test_what_is_no_classic_frame_is_passed_over(bus: FaultyBus) -> None:
+def test_frames_other_than_classic_data_frames_are_skipped(bus: FaultyBus) -> None:
     bus.messages = [
         can.Message(arbitration_id=0x4, is_error_frame=True),  # an error, but not bus-off
         can.Message(arbitration_id=0x221, is_extended_id=True, data=b"\x01"),

@@ -51,7 +51,7 @@ def test_too_fast_a_turn_in_place_is_slowed() -> None:
     assert (fitted.v_mps, fitted.w_radps) == (0.0, -2.5)
 
 
-def test_what_was_never_sent_is_due_and_what_was_is_so_again_a_period_later() -> None:
+def test_command_is_due_at_first_and_again_after_a_period() -> None:
     assert due(None, 20 * MS, 0)
     assert not due(1000 * MS, 20 * MS, 1000 * MS)
     assert not due(1000 * MS, 20 * MS, 1010 * MS)

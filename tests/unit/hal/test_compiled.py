@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import inspect
 import os
 import pkgutil
 import resource
@@ -10,7 +11,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from types import CodeType, ModuleType
+from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
 import numpy as np
@@ -143,7 +144,7 @@ def run_step(folder: Path, most_bytes: int | None = None, text: str = STEP) -> t
     return done.returncode, done.stdout, done.stderr
 
 
-def test_what_is_kept_is_made_anew_when_what_a_step_rests_on_changes(tmp_path: Path) -> None:
+def test_cached_step_is_rebuilt_when_a_part_or_constant_changes(tmp_path: Path) -> None:
     """A part, called by way of another one, and a constant, both of another file."""
 
     def told_with(times: float, plus: float) -> tuple[str, str]:
@@ -161,9 +162,7 @@ def test_what_is_kept_is_made_anew_when_what_a_step_rests_on_changes(tmp_path: P
 
 @pytest.mark.parametrize("left_bytes", [0, 20])
 @pytest.mark.parametrize("ending", ["nbi", "nbc"])
-def test_what_is_kept_is_read_again_and_made_anew_where_it_is_damaged(
-    tmp_path: Path, ending: str, left_bytes: int
-) -> None:
+def test_cache_is_read_again_and_rebuilt_if_damaged(tmp_path: Path, ending: str, left_bytes: int) -> None:
     code, answer, told = run_step(tmp_path)
     assert (code, answer) == (0, "3.0\n")
     assert "compiling for this processor" in told
@@ -211,33 +210,39 @@ def modules() -> Iterator[ModuleType]:
                 yield importlib.import_module(found.name)
 
 
-def steps() -> list[Any]:
-    """Every compiled step of the project, and what is inlined into one."""
-    return [
-        step
+def steps() -> list[FunctionType]:
+    """Every compiled step of the project, and what is inlined into one, as written."""
+    written = [
+        (module, step.py_func if isinstance(step, Dispatcher) else inspect.unwrap(step))
         for module in modules()
         for step in vars(module).values()
-        if isinstance(step, Dispatcher) and step.py_func.__module__ == module.__name__
+        if isinstance(step, Dispatcher) or takes_records(step)
     ]
+    return [function for module, function in written if function.__module__ == module.__name__]
+
+
+def takes_records(step: object) -> bool:
+    return isinstance(step, FunctionType) and isinstance(step.__globals__.get("_step"), Dispatcher)
 
 
 def test_a_step_reads_no_constant_by_way_of_a_module() -> None:
     """What is kept of it would not be made anew when that changes."""
     foreign = {
-        (step.py_func.__module__, name)
+        (step.__module__, name)
         for step in steps()
-        for name in step.py_func.__code__.co_names
-        if isinstance(step.py_func.__globals__.get(name), ModuleType) and name not in ("np", "math")
+        for name in step.__code__.co_names
+        if isinstance(step.__globals__.get(name), ModuleType) and name not in ("np", "math")
     }
     assert len(steps()) > 10
+    assert "_out_of_view" in [step.__name__ for step in steps()]  # one that takes records
     assert foreign == set()
 
 
 def test_a_step_has_no_code_within_its_code() -> None:
     """Constants that only a comprehension or an inner function reads would not be noticed, either."""
     nested = {
-        (step.py_func.__module__, step.py_func.__name__)
+        (step.__module__, step.__name__)
         for step in steps()
-        if any(isinstance(constant, CodeType) for constant in step.py_func.__code__.co_consts)
+        if any(isinstance(constant, CodeType) for constant in step.__code__.co_consts)
     }
     assert nested == set()

@@ -138,7 +138,7 @@ def test_the_sentence_of_a_slow_base_names_both_speeds() -> None:
     )
 
 
-def test_what_a_base_coasts_after_faster_orders_is_not_too_fast() -> None:
+def test_coasting_after_faster_commands_is_not_too_fast() -> None:
     """It lags by 2 s, and is told to creep after 1.5 m/s."""
     following, plant = Following(), TrackedPlant(PlantConfig(lag_s=2.0))
     for period in range(10 * 50):
@@ -213,7 +213,7 @@ def test_the_sentence_of_one_that_runs_away_asks_whether_it_holds_itself() -> No
 
 
 @pytest.mark.parametrize(("v_mps", "w_radps"), [(0.04, 0.0), (-0.04, 0.0), (0.0, 0.15)])
-def test_what_hardly_moves_stands(v_mps: float, w_radps: float) -> None:
+def test_hardly_moving_base_counts_as_standing(v_mps: float, w_radps: float) -> None:
     assert runs_away(v_mps, w_radps, 10.0) is None
 
 

@@ -28,7 +28,7 @@ def test_clocks_that_drift_by_one_in_two_hundred_are_no_delay(sender_ms: int) ->
     assert {age.step(sender_ms, k * 200 * MS) for k in range(20_000)} == {0}
 
 
-def test_what_falls_behind_by_one_in_twenty_is_noticed() -> None:
+def test_camera_that_falls_behind_by_five_percent_is_noticed() -> None:
     """Of 50 ms that are lost each second 10 are taken for drift: 200 ms of age after 5 s."""
     age = FrameAge()
     ages = [age.step(190, k * 200 * MS) for k in range(27)]

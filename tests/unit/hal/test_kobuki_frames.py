@@ -29,7 +29,7 @@ def test_a_loop_that_stood_still_is_no_restart(stall_ms: int, mode: ChassisMode,
     assert (state.mode, state.reason) == (mode, reason)
 
 
-def test_what_waited_in_a_full_buffer_before_the_consent_is_no_restart() -> None:
+def test_clock_jump_behind_buffered_data_before_the_consent_is_no_restart() -> None:
     """Of five seconds the port kept the first: the base's clock jumps, behind what had waited."""
     bench = Bench()
     kept = 0

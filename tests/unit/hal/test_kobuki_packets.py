@@ -53,7 +53,7 @@ def test_twists_become_speed_and_radius_within_int16(
     assert said(v_mps, w_radps) == wire
 
 
-def test_what_is_no_number_is_not_written() -> None:
+def test_nan_is_not_encoded() -> None:
     with pytest.raises(ValueError, match="NaN"):
         packets.base_control(math.nan, 0.0)
 

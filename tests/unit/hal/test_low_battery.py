@@ -34,7 +34,7 @@ def told(limit_v: float | None, *voltages_v: float) -> list[str]:
     return sentences
 
 
-def test_what_lasts_is_told_and_a_dip_is_not() -> None:
+def test_lasting_low_voltage_is_reported_and_a_dip_is_not() -> None:
     low = "warning: battery below 22.5 V"
     assert told(22.5, 24.0, 22.0, 22.0, 22.0, 22.0, 24.0) == ["", "", "", "", low, ""]
     assert not any(told(22.5, 22.0, 22.0, 23.0, 22.0, 22.0, 22.0))

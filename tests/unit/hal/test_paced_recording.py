@@ -42,7 +42,7 @@ def test_frames_come_at_their_pace_and_bear_the_time_of_this_clock(
     assert times == [500 * NS_PER_S + number * PERIOD_NS for number in range(3)]
 
 
-def test_who_comes_late_gets_the_frame_with_the_time_it_was_taken(
+def test_late_reader_gets_the_frame_with_its_capture_time(
     camera: PacedRecording, clock: SimulatedClock
 ) -> None:
     with camera:
@@ -53,7 +53,7 @@ def test_who_comes_late_gets_the_frame_with_the_time_it_was_taken(
 
 
 @pytest.mark.parametrize("kind", ["folder", "folder without reading ahead", "bag"])
-def test_who_does_not_keep_up_gets_the_newest_frame(kind: str, tmp_path: Path, clock: SimulatedClock) -> None:
+def test_slow_reader_gets_the_newest_frame(kind: str, tmp_path: Path, clock: SimulatedClock) -> None:
     """Else every frame would be older than the one before, and the robot would stand for ever."""
     recording: Recording
     if kind == "bag":

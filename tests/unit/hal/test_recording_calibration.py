@@ -124,7 +124,7 @@ def test_depth_that_is_cut_off_stays_so(ahead_m: float) -> None:
     assert moved[240, 100] == 65_535
 
 
-def test_what_lies_behind_the_colour_camera_is_not_drawn() -> None:
+def test_depth_behind_the_colour_camera_is_not_drawn() -> None:
     depth = np.full((480, 640), 500, np.uint16)
     registration = DepthRegistration(CAMERA, CAMERA, Pose(np.eye(3), np.array([0.0, 0.0, -1.0])), 0.001)
     assert not registration(depth).any()

@@ -105,7 +105,7 @@ def test_why_it_cannot_be_opened_is_told_and_it_is_tried_again(link: SlowLink) -
 
 
 @pytest.mark.parametrize("early", [True, False])
-def test_what_opens_after_the_end_is_closed(link: SlowLink, early: bool) -> None:
+def test_link_that_opens_after_the_end_is_closed(link: SlowLink, early: bool) -> None:
     link.may_close.set()
     link.lose()
     reason_of(link.use)
@@ -128,7 +128,7 @@ def test_the_end_while_the_lost_one_is_closed_opens_nothing(link: SlowLink) -> N
     assert (link.opened, link.closed) == (1, ["device 1"])
 
 
-def test_what_is_begun_again_waits_until_the_lost_one_is_closed(link: SlowLink) -> None:
+def test_reopened_link_waits_until_the_lost_one_is_closed(link: SlowLink) -> None:
     link.may_open.set()
     link.lose()
     link.__exit__(None, None, None)

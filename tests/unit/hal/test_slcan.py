@@ -57,7 +57,7 @@ def test_a_slcan_adapter_that_takes_nothing_is_not_waited_for(monkeypatch: pytes
         hear(adapter, until=b"t11120096\r")
 
 
-def test_what_a_slcan_adapter_acknowledges_hides_no_frames() -> None:
+def test_slcan_acknowledgements_hide_no_frames() -> None:
     """Two acknowledgements for each exchange, and one read of them: frames would wait longer and longer."""
     with SettledTerminal() as adapter, CanBusLink(slcan(adapter)) as link:
         adapter.write(b"z\rz\r\a\rt2211AA\rz\rt2211BB\rt22")
@@ -70,7 +70,7 @@ def test_what_a_slcan_adapter_acknowledges_hides_no_frames() -> None:
         assert link.receive() == CanFrame(0x221, b"\xcc")
 
 
-def test_what_waits_to_be_written_is_dropped_with_a_lost_adapter_alone(
+def test_unwritten_output_is_dropped_only_if_the_adapter_is_lost(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """One that hung would send old motion frames when it wakes; the last zero of a drive has to arrive."""

@@ -33,7 +33,7 @@ def test_too_far_apart_is_no_pair() -> None:
     assert (pairing.colour.unpaired, pairing.depth.unpaired) == (1, 1)
 
 
-def test_what_does_not_come_later_is_left_out_and_counted() -> None:
+def test_out_of_order_stamps_are_dropped_and_counted() -> None:
     pairing: StampPairing[str] = StampPairing(GAP)
     for stamp in (10, 10, 5, 30):
         pairing.colour.add(stamp, "")

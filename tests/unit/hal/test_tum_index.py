@@ -46,7 +46,7 @@ def test_a_float_would_not_have_been_exact() -> None:
 @pytest.mark.parametrize(
     "text", ["", "nan", "inf", "-inf", "1305031236,73", "rgb/1.png", "1e30", "1e999999999"]
 )
-def test_what_is_not_a_possible_time_is_refused(text: str) -> None:
+def test_impossible_time_stamp_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match="time in seconds"):
         parse_stamp_ns(text)
 

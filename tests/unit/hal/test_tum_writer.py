@@ -52,7 +52,7 @@ def test_the_mount_comes_back(tmp_path: Path) -> None:
     assert read.pitch_rad == pytest.approx(mount.pitch_rad)
 
 
-def test_what_was_written_before_an_abrupt_end_can_be_read(tmp_path: Path) -> None:
+def test_frames_written_before_an_abrupt_end_can_be_read(tmp_path: Path) -> None:
     writer = TumWriter(tmp_path)
     with writer:
         writer.write(small_frame(0))

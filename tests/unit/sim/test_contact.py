@@ -93,7 +93,7 @@ def test_a_beam_counts_only_below_the_robots_top(z_m: float, touches: bool) -> N
 
 
 @pytest.mark.parametrize(("height_m", "touches"), [(0.04, False), (0.144, True)])
-def test_what_is_lower_than_the_clearance_can_be_driven_over(height_m: float, touches: bool) -> None:
+def test_body_lower_than_the_clearance_can_be_driven_over(height_m: float, touches: bool) -> None:
     pallet = Pallet(kind="pallet", name="pallet", x_m=0.0, y_m=0.0, height_m=height_m)
     assert nearest_body(world(pallet), ROBOT, HERE, 0.0).touches is touches
 

@@ -79,7 +79,7 @@ def test_over_times_is_the_look_at_each() -> None:
             assert series[k] == pytest.approx(plane.snapshot(t_s)[0][body])
 
 
-def test_what_was_foreseen_is_what_is_seen() -> None:
+def test_precomputed_snapshots_equal_computed_ones() -> None:
     plane, plain = PlanarWorld(SCENARIO, seed=5), PlanarWorld(SCENARIO, seed=5)
     times = np.array([0.0, 1.7, 3.3, 500.0])
     plane.precompute(times)

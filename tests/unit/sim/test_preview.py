@@ -35,7 +35,7 @@ def test_it_writes_four_pictures_in_one(tmp_path: Path) -> None:
     ("scenario", "file", "says"),
     [("moon", "look.png", "no such scenario"), ("empty", "no/such/folder/look.png", "cannot be written")],
 )
-def test_what_is_wrong_is_told_in_one_line(scenario: str, file: str, says: str, tmp_path: Path) -> None:
+def test_preview_errors_are_reported_in_one_line(scenario: str, file: str, says: str, tmp_path: Path) -> None:
     done = CliRunner().invoke(main, [scenario, "--out", str(tmp_path / file)])
     assert done.exit_code != 0
     assert says in done.output

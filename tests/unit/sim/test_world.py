@@ -49,7 +49,7 @@ EVERY_KIND: tuple[BodySpec, ...] = (
 
 @pytest.mark.parametrize("spec", EVERY_KIND, ids=lambda spec: spec.kind)
 @pytest.mark.parametrize("texture", ["fine", "coarse", "plain"])
-def test_what_is_drawn_stays_within_footprint_and_height(spec: BodySpec, texture: str) -> None:
+def test_drawn_body_stays_within_its_footprint_and_height(spec: BodySpec, texture: str) -> None:
     assert_within(world(spec.model_copy(update={"texture": texture})), 0.0)
 
 
@@ -98,7 +98,7 @@ def test_geometry_is_a_function_of_time_alone() -> None:
     assert np.array_equal(second.geometry(3.3).corners_m, later.corners_m)
 
 
-def test_who_stands_is_posed_as_if_asked_for_the_first_time() -> None:
+def test_pose_of_a_standing_body_does_not_depend_on_earlier_queries() -> None:
     scenario = load_scenario("warehouse")
     one = World(scenario, seed=1)
     # Before they start, on their way, in between, again, and long after they have arrived.

@@ -124,7 +124,7 @@ def test_the_command_prints_and_writes(tmp_path: Path, monkeypatch: pytest.Monke
     assert json.loads(target.read_text()) == report().as_json()
 
 
-def test_what_cannot_be_written_is_told_before_measuring(
+def test_unwritable_report_is_reported_before_measuring(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(command, "measure_all", lambda plan: pytest.fail("measured for nothing"))

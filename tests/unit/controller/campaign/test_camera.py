@@ -35,7 +35,7 @@ def movers(observations: Path) -> dict[float, list[list[float]]]:
     return {row["stamp"]: [one["bbox"] for one in row["obstacles"] if one["moving"]] for row in rows}
 
 
-def test_what_was_seen_in_a_mission_is_seen_in_its_recording(tmp_path: Path) -> None:
+def test_replay_of_a_recorded_mission_sees_the_same(tmp_path: Path) -> None:
     """Two seconds of it, of which the camera was silent for a third of one."""
     faults = silent(0.6, 0.9)
     made = stage(mover(5.0, 1.5, 5.0, -3.0, 1.0), crate(7.0, 2.0), duration_s=2.0, faults=faults)

@@ -257,7 +257,7 @@ def test_totals_add_up_and_ratios_count_where_both_arrived() -> None:
     assert (one.false_stops, one.missions_with_false_stop, one.flaps, one.max_jerk_mps3) == (2, 1, 1, 2.0)
 
 
-def test_what_failed_is_named_with_its_reason() -> None:
+def test_failed_missions_are_listed_with_their_reason() -> None:
     summary = summarise(
         [
             made_row(1),

@@ -111,7 +111,7 @@ def test_the_driver_has_no_better_eyes_than_the_robot(faults: Faults, at_fault: 
 
 
 @pytest.mark.parametrize("faults", [Faults(), silent(1.3, 4.35)])
-def test_who_stood_while_nothing_was_seen_is_not_known_to_go_on(faults: Faults) -> None:
+def test_stop_without_a_visible_body_does_not_count_as_going_on(faults: Faults) -> None:
     steps = (
         Go(kind="go", x_m=4.5, y_m=1.5, speed_mps=1.5),
         Wait(kind="wait", duration_s=3.0),
@@ -164,7 +164,7 @@ def test_time_and_limits_come_from_the_drive() -> None:
     assert row.oracle_time_s is not None
 
 
-def test_what_even_the_oracle_does_not_reach_has_no_time() -> None:
+def test_mission_that_the_oracle_cannot_finish_has_no_time() -> None:
     made = stage(crate(4.0), blocked=True)
     reference = replace(judge_reference(made, CONFIG), oracle=OracleTime(math.inf, math.inf))
     row = judge(made, cruise(0.0, 1.0), "ours", "noise", reference)

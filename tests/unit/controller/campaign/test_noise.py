@@ -97,7 +97,7 @@ def test_some_frames_miss_it_and_it_is_predicted_meanwhile() -> None:
     assert max(unseen) < NoiseModel().forget_s
 
 
-def test_what_goes_out_of_sight_is_forgotten_after_half_a_second_and_comes_back_as_another() -> None:
+def test_hidden_track_is_forgotten_after_half_a_second_and_gets_a_new_id() -> None:
     """It crosses from right to left; a tall crate hides it for two seconds in the middle."""
     made = stage(mover(8.0, -4.0, 8.0, 6.0, 1.0, name="walker"), crate(4.0, 0.0, size_m=1.2, name="hides"))
     crate_id = scenes(stage(crate(4.0, 0.0, size_m=1.2)), 5, QUIET)[-1].obstacles[0].id
@@ -135,13 +135,13 @@ def test_free_space_errs_towards_near() -> None:
     assert 0.03 < space.std() < 0.2
 
 
-def test_what_the_robot_can_drive_over_or_under_is_no_surface() -> None:
+def test_body_that_the_robot_drives_over_or_under_is_no_surface() -> None:
     for body in (crate(5.0, height_m=0.04), crate(5.0).model_copy(update={"z_m": 1.5})):
         assert np.isinf(scenes(stage(body), 1, QUIET)[0].free_space.nearest_m).all()
 
 
 @pytest.mark.parametrize(("under_m", "listed"), [(0.79, True), (0.81, False)])
-def test_what_hangs_above_the_robot_is_no_obstacle(under_m: float, listed: bool) -> None:
+def test_body_that_hangs_above_the_robot_is_no_obstacle(under_m: float, listed: bool) -> None:
     hangs = crate(5.0).model_copy(update={"z_m": under_m})
     assert any(one.obstacles for one in scenes(stage(hangs), 5, QUIET)) == listed
 

@@ -41,12 +41,12 @@ def test_the_lattice_arrives_within_a_step_of_the_trapezoid() -> None:
     assert exact - lattice.dt_s <= steps * lattice.dt_s <= exact + 2 * lattice.dt_s
 
 
-def test_what_stands_on_the_way_for_ever_is_never_passed() -> None:
+def test_oracle_never_passes_a_body_that_stays_on_the_path() -> None:
     best = oracle.solve(stage(crate(6.0), length_m=10.0), TOP, 60.0)
     assert math.isinf(best.total_s)
 
 
-def test_what_stands_beside_the_way_costs_nothing() -> None:
+def test_body_beside_the_path_costs_the_oracle_no_time() -> None:
     best = oracle.solve(stage(crate(6.0, 0.39 + 0.3 + 0.02), length_m=10.0), TOP, 60.0)
     assert best.delay_s == 0.0
 

@@ -109,7 +109,7 @@ def test_one_mission_of_a_scenario_alone(world: Path) -> None:
     assert "reached in" in campaign("--only", "hall.yaml:3", "--scenario", world, "--policies", "field")
 
 
-def test_what_was_not_driven_yet_may_change(world: Path, tmp_path: Path) -> None:
+def test_kept_scenario_without_missions_may_change(world: Path, tmp_path: Path) -> None:
     kept = tmp_path / "report" / "scenarios" / "hall.yaml"
     kept.parent.mkdir(parents=True)
     kept.write_text(WORLD.replace("y_m: 1.5", "y_m: 1.4"))
@@ -130,7 +130,7 @@ def test_a_world_without_bodies_has_no_clearance_to_tell(world: Path, tmp_path: 
     assert "; a \\| b the way; " in (report / "report.md").read_text()
 
 
-def test_what_is_doubtful_is_told(world: Path) -> None:
+def test_doubtful_scenario_is_reported(world: Path) -> None:
     world.write_text(WORLD.replace("y_m: 1.5", "y_m: 0.89"))
     assert "from 'crate'" in campaign("--only", f"{world}:3", "--policies", "field")
 

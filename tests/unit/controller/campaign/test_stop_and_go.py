@@ -63,7 +63,7 @@ def test_a_stop_for_nothing_is_counted_and_standing_at_the_end_is_not() -> None:
     assert measured(made_up(blip=True)).false_stop_share == pytest.approx(1.0 / 18.0, abs=0.002)
 
 
-def test_who_never_stops_or_never_goes_on() -> None:
+def test_drive_that_never_stops_or_never_goes_on() -> None:
     never = measured(made_up(stops_s=29.0, goes_s=29.0))
     assert (never.to_stop_s, never.hold_share) == (math.inf, 0.0)
     assert [one.missed(never) for one in TARGETS] == [True, True, False, False]

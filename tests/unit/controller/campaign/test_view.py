@@ -55,7 +55,7 @@ def test_behind_beside_and_beyond_the_range_nothing_is_seen(x_m: float, y_m: flo
     assert not np.isfinite(distances(view)).any()
 
 
-def test_what_stands_behind_something_tall_is_hidden() -> None:
+def test_body_behind_a_tall_one_is_hidden() -> None:
     _, view = look(crate(3.0, size_m=1.0, name="near"), crate(6.0, size_m=0.8, name="far"))
     assert np.isfinite(distances(view, 0)).any()
     assert not np.isfinite(distances(view, 1)).any()
@@ -70,13 +70,13 @@ def test_part_of_it_is_seen_beside_the_edge() -> None:
     assert (seen > 0.0).all()
 
 
-def test_what_is_lower_than_the_camera_hides_nothing() -> None:
+def test_body_lower_than_the_camera_hides_nothing() -> None:
     low = Pallet(kind="pallet", name="near", x_m=3.0, y_m=0.0)
     _, view = look(low, crate(6.0, size_m=0.8, name="far"))
     assert np.isfinite(distances(view, 1)).any()
 
 
-def test_what_is_low_and_near_is_below_the_image() -> None:
+def test_low_body_nearby_is_below_the_image() -> None:
     """A level camera at 0.6 m sees 0.144 m high things from 0.6 - 0.144 = 0.393 z on: 1.16 m."""
     low = Pallet(kind="pallet", name="pallet", x_m=1.0, y_m=0.0, length_m=0.2, width_m=0.4)
     assert not np.isfinite(distances(look(low)[1])).any()

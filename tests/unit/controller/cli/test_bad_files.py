@@ -67,7 +67,7 @@ def test_a_topic_of_odometry_that_is_not_wanted(tmp_path: Path) -> None:
         ("--video", "nowhere/v.mp4", "the video cannot be written there"),
     ],
 )
-def test_what_cannot_be_recorded_is_told_before_a_robot_is_armed(
+def test_unwritable_recording_is_reported_before_the_robot_is_armed(
     option: str, name: str, told: str, recording: Path
 ) -> None:
     message = refusal("run", "--config", CONFIG_DIR / "sim-realtime.yaml", option, recording / name)

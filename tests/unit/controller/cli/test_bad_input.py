@@ -55,7 +55,7 @@ def test_a_camera_that_is_not_there(tmp_path: Path) -> None:
     assert message.endswith("; nothing has moved")
 
 
-def test_what_follows_from_a_wrong_value_is_not_told_as_well(tmp_path: Path) -> None:
+def test_consequences_of_a_wrong_value_are_not_reported(tmp_path: Path) -> None:
     config = changed_config(tmp_path, camera={"kind": "simulated", "width": 7})
     assert refusal("run", "--config", config) == (
         f"treadwatch: {config}: camera.width: Input should be greater than or equal to 32, found 7"

@@ -27,6 +27,6 @@ def test_every_option_says_what_it_does(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["run", "govern", "replay"])
-def test_what_can_be_recorded_can_be_recorded_everywhere(name: str) -> None:
+def test_all_commands_offer_the_same_recordings(name: str) -> None:
     listed = [one.opts[0] for one in cli.commands[name].params]
     assert tuple(option for option in listed if option in RECORDED) == RECORDED

@@ -82,7 +82,7 @@ def test_a_crate_is_no_corner() -> None:
 
 
 @pytest.mark.parametrize(("gap_m", "corner"), [(0.3, False), (0.7, False), (1.5, True)])
-def test_what_is_between_two_goods_in_a_rack_is_no_passage(gap_m: float, corner: bool) -> None:
+def test_gap_between_goods_in_a_rack_is_no_passage(gap_m: float, corner: bool) -> None:
     aisle = Aisle(5.0, 0.4, 1, gap_m=gap_m)
     for s_m in np.arange(0.5, 2.5, 0.05):
         aisle.look(float(s_m))
@@ -95,7 +95,7 @@ def test_people_one_behind_the_other_are_no_face() -> None:
     assert aisle.corners.nearest(1.51) is None
 
 
-def test_what_was_noise_is_forgotten() -> None:
+def test_corner_by_noise_is_forgotten() -> None:
     aisle = Aisle(5.5, 0.6, 1)
     aisle.look(0.5, times=4)
     assert aisle.corners.nearest(1.01) is not None

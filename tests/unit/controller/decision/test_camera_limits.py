@@ -33,7 +33,7 @@ def test_a_degraded_camera_caps_the_speed() -> None:
 
 
 @pytest.mark.parametrize("somebody_walks", [False, True])
-def test_who_goes_blind_beside_somebody_brakes_hard(somebody_walks: bool) -> None:
+def test_robot_that_goes_blind_beside_a_walker_brakes_hard(somebody_walks: bool) -> None:
     bench = Bench()
     people = [obstacle(6.0, 2.0, vx_mps=1.0)] if somebody_walks else []
     bench.settle(*people)
@@ -42,7 +42,7 @@ def test_who_goes_blind_beside_somebody_brakes_hard(somebody_walks: bool) -> Non
     assert decision.emergency == somebody_walks
 
 
-def test_who_sees_nothing_for_long_brakes_hard_though_nobody_was_there() -> None:
+def test_robot_without_a_good_scene_for_long_brakes_hard() -> None:
     """A frozen camera, with a new stamp every 20 ms, and one that falls silent."""
     covered = CameraHealth(CameraCondition.UNTRUSTWORTHY, "frozen", 0.9)
     for silent in (False, True):

@@ -38,18 +38,18 @@ def test_an_oblique_one_blocks_other_places_when_it_leaves() -> None:
     assert one.lo_out_m == pytest.approx(7.3 - 0.5 * 3.75)
 
 
-def test_what_is_in_the_way_already_is_so_from_now_on() -> None:
+def test_conflict_with_a_body_on_the_path_begins_now() -> None:
     (one,) = conflicts(box(8.0, 0.0, 0.0, -1.0))
     assert (one.in_s, one.out_s) == pytest.approx((0.0, 0.75))
 
 
-def test_what_does_not_leave_stays() -> None:
+def test_conflict_with_a_body_that_stays_never_ends() -> None:
     (one,) = conflicts(box(8.0, 0.0, -0.5, 0.0))
     assert one.in_s == 0.0
     assert math.isinf(one.out_s)
 
 
-def test_what_passes_beside_or_walks_away_is_no_conflict() -> None:
+def test_body_that_passes_beside_or_walks_away_is_no_conflict() -> None:
     assert conflicts(box(8.0, 1.0, -1.0, 0.0)) == []
     assert conflicts(box(8.0, 1.0, 0.0, 1.0)) == []
 
@@ -111,12 +111,12 @@ def test_too_near_even_for_standing() -> None:
     assert choose(near, 0.5).yield_mps == 0.0
 
 
-def test_what_stays_cannot_be_waited_for() -> None:
+def test_yielding_to_a_conflict_without_end_means_stopping() -> None:
     stays = Conflict(0, 3.0, math.inf, 5.0, 3.0, 6.0)
     assert choose(stays, 1.0).yield_mps == 0.0
 
 
-def test_who_may_be_nearer_than_where_it_is_placed_may_come_in() -> None:
+def test_uncertain_position_makes_a_body_likely_to_enter() -> None:
     """Goes along the way, 0.5 m beside the swept width."""
     placed = place(box(4.0, 0.4 + 0.25 + 0.5, -0.5, 0.0), CORRIDOR, TIMES, 0.0, 12.0)
     assert not likely_enters(placed, TIMES, np.zeros(1), np.array([0.45])).any()

@@ -134,7 +134,7 @@ def test_a_blind_camera_teaches_nothing() -> None:
     assert seen.target_speed_mps < 0.5
 
 
-def test_who_comes_so_near_that_depth_fails_is_not_driven_into() -> None:
+def test_robot_does_not_drive_into_a_person_too_near_for_depth() -> None:
     """The floor before the robot was free a second ago; then nothing is seen there any more, and nobody
     says that the camera cannot be trusted."""
     bench = Bench()
@@ -212,7 +212,7 @@ def test_the_same_moment_twice_is_no_fault() -> None:
     assert bench.step(bench.scene()).reason.rule == "free"
 
 
-def test_who_waits_for_the_camera_is_not_stuck() -> None:
+def test_robot_that_waits_for_the_camera_is_not_stuck() -> None:
     bench = Bench()
     scene = bench.scene()
     for _ in range(20):

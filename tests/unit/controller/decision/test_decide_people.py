@@ -47,7 +47,7 @@ def test_a_crossing_person_is_given_way_by_slowing_a_little() -> None:
     assert 0.5 < decision.target_speed_mps < 1.4
 
 
-def test_who_leaves_in_many_seconds_is_approached_like_who_stands() -> None:
+def test_body_that_leaves_slowly_is_approached_like_a_standing_one() -> None:
     """To arrive as it leaves, 0.5 m/s would do; a stop before it is still possible from twice as much."""
     decision = Bench().settle(obstacle(4.0, 0.5, vy_mps=-0.3, sigma_mps=0.05), v_mps=0.8)
     assert decision.reason.sentence.startswith("obstacle 5 is on the path 3.4 m ahead")
@@ -112,14 +112,14 @@ def test_a_person_beside_the_path_who_walks_along_is_passed_slower_not_waited_fo
     assert decision.target_speed_mps > 0.7
 
 
-def test_who_comes_along_the_side_is_passed_slowly_not_waited_for() -> None:
+def test_oncoming_body_beside_the_path_is_passed_slowly() -> None:
     """0.1 m stay between a person of 0.5 m, who comes at 1 m/s, and the swept width."""
     for x_m in (4.0, 2.5, 1.6):
         decision = Bench().settle(obstacle(x_m, 0.74, vx_mps=-1.0, sigma_mps=0.05), v_mps=0.3)
         assert 0.3 <= decision.target_speed_mps < 0.85
 
 
-def test_who_has_left_the_view_is_not_waited_for_in_it() -> None:
+def test_robot_does_not_wait_for_a_body_whose_place_is_seen_free() -> None:
     """Measured as creeping into the middle, so near that only a part was in view; then the view is free."""
     bench = Bench()
     assert bench.settle(obstacle(1.2, -0.3, vx_mps=-0.12, vy_mps=0.08), v_mps=0.0).target_speed_mps == 0.0
@@ -129,12 +129,12 @@ def test_who_has_left_the_view_is_not_waited_for_in_it() -> None:
     assert bench.now_ns > gone_ns + 100_000_000
 
 
-def test_who_heads_into_the_way_is_waited_for() -> None:
+def test_robot_waits_for_a_body_that_heads_into_the_path() -> None:
     decision = Bench().settle(obstacle(1.6, 0.74, vx_mps=-1.0, vy_mps=-0.6, sigma_mps=0.05), v_mps=0.3)
     assert decision.target_speed_mps < 0.1
 
 
-def test_who_goes_the_robots_way_beside_it_may_cut_in() -> None:
+def test_body_that_goes_beside_the_robot_may_cut_in() -> None:
     """It does not see the robot coming; who comes towards it does."""
     along = obstacle(2.5, 1.2, vx_mps=0.6, sigma_mps=0.05)
     careful = Bench().settle(along, v_mps=1.2)
@@ -143,14 +143,14 @@ def test_who_goes_the_robots_way_beside_it_may_cut_in() -> None:
     assert Bench(config=trusting).settle(along, v_mps=1.2).target_speed_mps > careful.target_speed_mps
 
 
-def test_who_has_come_towards_it_for_a_while_keeps_its_lane() -> None:
+def test_oncoming_body_seen_for_a_while_keeps_its_lane() -> None:
     """The same distance and speed, but one was not there a moment ago."""
     known = Bench().settle(obstacle(2.0, 0.9, vx_mps=-0.8, sigma_mps=0.05, age_s=2.0), v_mps=0.9)
     fresh = Bench().settle(obstacle(2.0, 0.9, vx_mps=-0.8, sigma_mps=0.05, age_s=0.5), v_mps=0.9)
     assert fresh.target_speed_mps < known.target_speed_mps - 0.1
 
 
-def test_who_leaves_the_way_aslant_does_not_cut_in() -> None:
+def test_body_that_leaves_the_path_aslant_does_not_cut_in() -> None:
     """Out of the way and going further from it, ahead and away, at 35 degrees; and almost along the path."""
     leaving = Bench().settle(obstacle(2.5, 1.2, vx_mps=0.5, vy_mps=0.35, sigma_mps=0.05), v_mps=1.2)
     beside = Bench().settle(obstacle(2.5, 1.2, vx_mps=0.6, vy_mps=0.05, sigma_mps=0.05), v_mps=1.2)
@@ -160,7 +160,7 @@ def test_who_leaves_the_way_aslant_does_not_cut_in() -> None:
 @pytest.mark.parametrize(
     ("x_m", "y_m", "vy_mps", "differs_mps"), [(1.5, 0.9, 0.2, 0.0), (2.5, 1.2, -0.05, 0.3)]
 )
-def test_who_leaves_the_way_is_not_thought_to_have_turned_back_unseen(
+def test_unseen_body_that_left_the_path_is_not_assumed_to_turn_back(
     x_m: float, y_m: float, vy_mps: float, differs_mps: float
 ) -> None:
     """Not seen for 0.6 s: whoever leaves the way goes on; whoever does not may be nearer by now."""
@@ -188,7 +188,7 @@ def test_nobody_is_started_past_with_hardly_a_hand_between() -> None:
     assert Bench().settle(close, v_mps=0.3).target_speed_mps > 0.0
 
 
-def test_who_waited_and_walks_on_is_reckoned_with_anew() -> None:
+def test_walker_who_waited_and_goes_on_slows_the_robot_at_once() -> None:
     """When he would have left the way, had he not stopped, is long past: the robot slows for him at once."""
     bench, robot_mps, left_m = Bench(), 1.4, 3.0
 

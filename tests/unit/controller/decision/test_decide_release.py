@@ -61,7 +61,7 @@ def test_it_does_not_creep_on_whenever_what_stands_there_is_missed_for_a_moment(
             assert "stands on the path" in decision.reason.sentence
 
 
-def test_what_comes_and_goes_does_not_stop_a_robot_that_still_rolls_but_lets_it_get_no_faster() -> None:
+def test_obstacle_that_comes_and_goes_keeps_a_rolling_robot_from_getting_faster() -> None:
     """Half a second there, half a second gone, there again, gone: meanwhile the robot has come to roll."""
     bench = Bench()
     there = obstacle(1.2, 0.0)
@@ -85,7 +85,7 @@ def test_once_it_has_been_gone_for_a_second_the_way_is_free() -> None:
     assert 1.0 <= waited * 0.02 <= 1.3
 
 
-def test_what_came_back_long_after_it_had_gone_does_not_count_as_coming_and_going() -> None:
+def test_obstacle_that_returns_much_later_does_not_count_as_coming_and_going() -> None:
     bench = Bench()
     there = obstacle(1.2, 0.0)
     for frame in range(25 + 260 + 25):
@@ -105,7 +105,7 @@ def test_it_does_not_creep_up_to_what_blocks_the_way() -> None:
     assert decision.target_speed_mps == 0.0
 
 
-def test_what_may_be_driven_beside_somebody_may_be_started_beside_them() -> None:
+def test_speed_allowed_beside_a_person_is_allowed_for_starting() -> None:
     """Whose lane is kept for the moment at 0.35 m/s: nothing that the robot would creep up to."""
     decision = Bench().settle(obstacle(1.6, 0.9, vx_mps=-1.0, age_s=0.6), v_mps=0.0)
     assert decision.target_speed_mps == pytest.approx(0.35)
@@ -125,7 +125,7 @@ def test_hard_braking_lasts_until_the_speed_is_what_is_allowed() -> None:
     assert not bench.step(bench.scene(crate), 0.66).emergency
 
 
-def test_who_stands_does_not_brake_hard() -> None:
+def test_standing_robot_does_not_brake_hard() -> None:
     assert Bench().settle(obstacle(0.9, 0.0), v_mps=0.2).emergency
     assert not Bench().settle(obstacle(0.9, 0.0), v_mps=0.0).emergency
     assert not Bench().settle(obstacle(1.2, 0.0, vx_mps=-1.0), v_mps=0.0).emergency
@@ -142,7 +142,7 @@ def test_held_back_it_says_by_what() -> None:
     assert decision.target_speed_mps < 1.5
 
 
-def test_what_holds_back_is_what_was_there_last() -> None:
+def test_hold_names_the_obstacle_that_was_there_last() -> None:
     """First obstacle 5, then a nearer 6; a free way in between is no reason."""
     bench = Bench()
     bench.settle(obstacle(4.0, 0.0), v_mps=1.2)
@@ -184,7 +184,7 @@ def test_nobody_is_started_beside_as_slowly_as_it_may_creep() -> None:
     assert decision.target_speed_mps == 0.0
 
 
-def test_who_sets_off_however_slowly_is_not_stuck() -> None:
+def test_robot_that_sets_off_slowly_is_not_stuck() -> None:
     config = DecisionConfig.model_validate({"release": {"go_m": 0.05}})
     decision = Bench(config=config).settle(obstacle(0.51 + 0.45 + 0.1 + 0.1, 0.0), v_mps=0.0)
     assert decision.reason.rule == "static"
@@ -192,7 +192,7 @@ def test_who_sets_off_however_slowly_is_not_stuck() -> None:
     assert decision.stuck_since_ns is None
 
 
-def test_what_does_not_block_the_way_may_be_as_slow_as_it_likes() -> None:
+def test_limit_that_blocks_nothing_may_be_below_the_creep_speed() -> None:
     """A degraded camera's limit is no place to creep up to."""
     config = DecisionConfig.model_validate({"sight": {"degraded_mps": 0.05}})
     bench = Bench(config=config)
@@ -259,7 +259,7 @@ def test_hard_braking_lasts_on_a_slow_section_too() -> None:
     assert not bench.step(bench.scene(), 0.42, path=slow).emergency
 
 
-def test_what_is_braked_away_needs_no_release_until_it_is_let_go_of() -> None:
+def test_speed_that_falls_anyway_needs_no_release() -> None:
     """Within hold_s nothing turns round; but at -0.3 m/s2 letting go, at 0.6 m/s3, leaves 0.9 - 0.075 m/s."""
     bench = Bench()
     bench.settle(v_mps=1.2)

@@ -96,7 +96,7 @@ def test_the_camera_may_sit_to_one_side(left_m: float, covered: bool) -> None:
 
 
 @pytest.mark.parametrize(("scale", "covered"), [(2.0, False), (1.001, True)])
-def test_what_other_bands_have_shown_says_nothing_of_these(scale: float, covered: bool) -> None:
+def test_lens_cover_judges_each_band_by_its_own_past(scale: float, covered: bool) -> None:
     """Bands elsewhere, as many as before; a camera that is levelled a little otherwise has the same ones."""
     bearing = scale * BEARING
     blank = np.abs(bearing) <= 0.2

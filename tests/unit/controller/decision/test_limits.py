@@ -12,7 +12,7 @@ from controller.decision.limits import Gap, Motion, speed_to_decide_by, standing
 COMFORT = BrakeLimits(0.3, 0.6)
 
 
-def test_what_is_far_enough_limits_nothing_and_tells_its_margin() -> None:
+def test_obstacle_far_enough_limits_nothing_and_states_its_margin() -> None:
     """From 1.5 m/s: 4.125 m, 0.2 s of latency 0.3 m, margin 0.45 m; 6 m leave 1.125 m."""
     limit = stop_before(
         Gap(6.0, obstacle_id=3), Motion(1.5, 0.0, 0.2), COMFORT, 0.45, 0.2, "static", "stands"
@@ -42,7 +42,7 @@ def test_standing_is_never_urgent() -> None:
     assert limit.reason.sentence == "a surface stands 0.0 m ahead: stop"
 
 
-def test_what_stands_beside_the_way_tells_how_much_room_it_leaves_and_how_much_is_needed() -> None:
+def test_text_of_a_body_beside_the_path_states_its_room_and_the_need() -> None:
     assert standing_text(-0.1, 0.2) == standing_text(math.inf, 0.2) == "stands on the path"
     assert standing_text(0.12, 0.2) == "leaves 0.12 m beside the swept width, which needs 0.20 m,"
 
@@ -55,7 +55,7 @@ def test_an_oncoming_obstacle_needs_more() -> None:
     assert coming.speed_mps < standing.speed_mps
 
 
-def test_what_runs_ahead_gives_room() -> None:
+def test_leader_that_runs_ahead_gives_room() -> None:
     motion = Motion(1.0, 0.0, 0.2)
     alone = stop_before(Gap(2.0), motion, COMFORT, 0.45, 0.2, "leader", "")
     running = stop_before(

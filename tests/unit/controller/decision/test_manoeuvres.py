@@ -61,7 +61,7 @@ def test_a_velocity_that_has_just_changed_is_known_no_better_than_by_that_change
     assert may_do.spread_left_mps[0] == pytest.approx(0.6)
 
 
-def test_who_comes_or_leaves_has_not_turned_while_out_of_view() -> None:
+def test_body_that_comes_or_leaves_has_not_turned_out_of_view() -> None:
     crosses, comes = found(box(5.0, 2.0, 0.0, -1.0)), found(box(5.0, 2.0, -1.0, 0.0))
     leaves = found(box(5.0, 2.0, 0.0, 1.0))
     assert crosses.since_s[0] == pytest.approx(SINCE_S + UNSEEN_S)

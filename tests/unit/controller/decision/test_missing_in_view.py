@@ -35,7 +35,7 @@ def seen_to(nearest_m: float, known_m: float) -> FreeSpace:
         "free floor",
     ],
 )
-def test_what_is_missed_in_the_middle_of_the_view_stays_until_its_place_is_seen(
+def test_standing_body_missed_in_the_view_is_kept_until_its_place_is_seen(
     free: FreeSpace, kept: list[int]
 ) -> None:
     """3.6 m ahead of the camera, as thin as a fork of a pallet jack."""
@@ -50,7 +50,7 @@ def test_what_is_missed_in_the_middle_of_the_view_stays_until_its_place_is_seen(
     [(1.1, 0.2, [1]), (0.9, 0.2, []), (1.1, 0.4, [])],
     ids=["stood", "seen for a moment only", "measured as moving"],
 )
-def test_what_did_not_surely_stand_does_not_stay_there(
+def test_body_that_did_not_surely_stand_is_not_kept_in_the_view(
     seen_s: float, measured_mps: float, kept: list[int]
 ) -> None:
     """A limb of somebody who walks by is judged standing for a moment."""

@@ -23,25 +23,25 @@ def test_a_low_pallet_sinks_below_the_view() -> None:
     assert recall.see(None, 3.8, standing=True) == [1]
 
 
-def test_what_is_tall_does_not_sink() -> None:
+def test_tall_body_does_not_sink_below_the_view() -> None:
     recall = Recall()
     recall.see(box(5.0, 0.0, top_m=1.7), 3.2)
     assert recall.see(None, 3.6, free=ALL_SEEN) == []
 
 
-def test_what_vanishes_far_away_has_gone() -> None:
+def test_body_that_vanishes_far_away_is_dropped() -> None:
     recall = Recall()
     recall.see(PALLET, 1.0)
     assert recall.see(None, 1.1, free=ALL_SEEN) == []
 
 
-def test_what_vanishes_while_the_robot_stands_has_gone() -> None:
+def test_body_that_vanishes_while_the_robot_stands_is_dropped() -> None:
     recall = Recall()
     recall.see(PALLET, 3.6)
     assert recall.see(None, 3.6, standing=True) == []
 
 
-def test_what_was_seen_too_shortly_is_not_believed() -> None:
+def test_body_seen_too_briefly_is_not_kept() -> None:
     recall = Recall()
     recall.see(replace(PALLET, age_s=np.array([0.2])), 3.2)
     assert recall.see(None, 3.6) == []
@@ -77,14 +77,14 @@ def test_feet_of_a_person_who_is_still_seen_are_no_body_of_their_own() -> None:
     assert recall.see(person, 3.6) == []
 
 
-def test_what_stands_beside_the_edge_of_the_view_is_still_there() -> None:
+def test_standing_body_beside_the_view_is_kept() -> None:
     beside = box(5.0, 0.5, top_m=1.7)
     recall = Recall()
     recall.see(beside, 3.5)
     assert recall.see(None, 3.8) == [1]
 
 
-def test_what_moves_out_of_view_goes_on_for_two_seconds() -> None:
+def test_mover_out_of_view_is_extrapolated_for_two_seconds() -> None:
     recall = Recall()
     recall.see(box(5.0, 0.9, 0.0, -0.5), 3.5)
     assert recall.see(None, 3.7) == [1]
@@ -102,7 +102,7 @@ def test_what_moves_out_of_view_goes_on_for_two_seconds() -> None:
     assert remembered[-1] == []
 
 
-def test_who_left_the_view_on_its_way_into_the_path_is_remembered_for_longer() -> None:
+def test_mover_that_left_the_view_towards_the_path_is_kept_longer() -> None:
     """Beside the view's edge, walking slowly towards the path: for more than the 2 s of who walks away."""
     recall = Recall()
     recall.see(box(2.0, 2.5, 0.0, -0.3), 0.0)
@@ -114,7 +114,7 @@ def test_who_left_the_view_on_its_way_into_the_path_is_remembered_for_longer() -
     assert kept == []
 
 
-def test_who_walks_away_is_not() -> None:
+def test_mover_that_walks_away_is_not_kept_longer() -> None:
     recall = Recall()
     recall.see(box(2.0, 2.5, 0.0, 0.3), 0.0)
     for _ in range(19):
@@ -125,7 +125,7 @@ def test_who_walks_away_is_not() -> None:
 
 
 @pytest.mark.parametrize(("aside_mps", "kept"), [(0.1, [1]), (0.2, []), (0.35, [])])
-def test_who_goes_along_but_leaves_aslant_is_not_either(aside_mps: float, kept: list[int]) -> None:
+def test_mover_that_leaves_aslant_is_not_kept_longer(aside_mps: float, kept: list[int]) -> None:
     """After 4 s: who goes almost along the path could still cut in."""
     recall = Recall()
     recall.see(box(2.0, 2.5, 0.5, aside_mps), 0.0)
@@ -154,7 +154,7 @@ LEAVING = replace(
 )
 
 
-def test_who_is_not_where_the_view_is_seen_through_is_beside_it() -> None:
+def test_mover_whose_place_is_seen_free_is_pushed_beside_the_view() -> None:
     """Its inner side beside the view, as far ahead as its back: 0.74 m from the camera, 0.5 to the side."""
     recall = Recall()
     recall.recall(LEAVING, 0.0, ALL_SEEN, standing=True)
@@ -190,7 +190,7 @@ def test_along_the_way_it_goes_on_if_that_is_known(sigma_mps: float, along_mps: 
     assert kept.velocity_mps[0].tolist() == pytest.approx([along_mps, 0.0])
 
 
-def test_who_comes_a_little_later_than_expected_still_comes() -> None:
+def test_approaching_mover_may_be_a_little_late() -> None:
     """At 0.8 m/s, and for 0.3 m and a little more it may only be late; then it has not come."""
     recall = Recall()
     coming = replace(LEAVING, xy_m=np.array([[1.0, 0.65]]), velocity_mps=np.array([[0.0, -0.8]]))

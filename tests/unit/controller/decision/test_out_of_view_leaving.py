@@ -49,7 +49,7 @@ def after(*scenes: Bodies) -> Bodies:
     return [view.mark_leaving_movers(scene, HERE, EDGES) for scene in scenes][-1]
 
 
-def test_who_is_clearly_coming_when_it_leaves_the_view_moves() -> None:
+def test_approaching_body_that_leaves_the_view_counts_as_moving() -> None:
     """A verdict takes some frames, of which there are no more."""
     found = after(measured(AT_EDGE, -0.4), expected(AT_EDGE), expected(AT_EDGE))
     assert found.moving.tolist() == [True]
@@ -102,7 +102,7 @@ def test_all_others_stay_what_perception_says(scenes: tuple[Bodies, ...]) -> Non
     assert found.velocity_mps[0].tolist() == [0.0, 0.0]
 
 
-def test_who_moves_keeps_its_averaged_velocity() -> None:
+def test_mover_that_leaves_the_view_keeps_its_averaged_velocity() -> None:
     walker = replace(box(4.4, 2.1, 0.0, -0.5), measured_mps=np.array([[0.0, -0.9]]), unseen_s=np.array([0.1]))
     second = replace(AT_EDGE, ids=np.array([2]))
     found = after(walker.joined(measured(second, -0.4)), walker.joined(expected(second)))
@@ -121,7 +121,7 @@ def kept_beside(newcomer: Bodies, remembered: Bodies) -> list[int]:
 EXPECTED = box(2.5, 1.2, 0.0, -0.5, sigma_mps=0.1)
 
 
-def test_who_comes_into_view_as_expected_is_the_one_that_was_expected() -> None:
+def test_body_seen_with_the_expected_velocity_replaces_the_expected_one() -> None:
     assert kept_beside(box(2.5, 1.1, 0.0, -0.7, number=2, age_s=0.6), EXPECTED) == []
 
 
@@ -143,14 +143,14 @@ def test_somebody_else_in_its_place_does_not_make_it_forgotten(newcomer: Bodies)
     assert kept_beside(newcomer, EXPECTED) == [1]
 
 
-def test_what_stands_is_part_of_whatever_is_seen_in_its_place() -> None:
+def test_standing_body_is_replaced_by_any_body_seen_in_its_place() -> None:
     assert kept_beside(box(2.5, 1.1, 0.0, -1.0, number=2), box(2.5, 1.2)) == []
 
 
 @pytest.mark.parametrize(
     ("left_mps", "age_s", "kept_s"), [(0.6, 0.9, 2.0), (0.4, 0.9, 60.0), (0.6, 1.1, 60.0)]
 )
-def test_who_was_certainly_going_is_not_thought_to_stand_where_it_is_not_seen(
+def test_body_that_certainly_moved_is_not_kept_as_standing(
     left_mps: float, age_s: float, kept_s: float
 ) -> None:
     """Before the nose, below the view: what stands there is waited for. 6 sigmas of velocity are no noise, 4
@@ -177,7 +177,7 @@ def out_of_view_after(seconds: float, left_mps: float, sigma_mps: float, fastest
     return found
 
 
-def test_who_was_certainly_going_goes_on_as_it_was_measured() -> None:
+def test_body_that_certainly_moved_goes_on_with_its_measured_velocity() -> None:
     found = out_of_view_after(0.5, left_mps=0.6, sigma_mps=0.1)
     assert found.velocity_mps[0].tolist() == [0.05, 0.6]
     assert found.xy_m[0].tolist() == pytest.approx([1.6 + 0.025, 0.1 + 0.3])
@@ -186,7 +186,7 @@ def test_who_was_certainly_going_goes_on_as_it_was_measured() -> None:
 @pytest.mark.parametrize(
     ("left_mps", "age_s", "kept"), [(0.6, 0.6, True), (0.4, 0.6, False), (0.6, 0.4, False), (0.6, 1.1, False)]
 )
-def test_who_was_certainly_going_goes_on_though_the_robot_stands(
+def test_body_that_certainly_moved_goes_on_though_the_robot_stands(
     left_mps: float, age_s: float, kept: bool
 ) -> None:
     """What stands and vanishes then has gone by itself; who was going is somewhere."""
@@ -219,7 +219,7 @@ def test_how_fast_any_obstacle_is_the_robots_limits_say(fastest_mps: float, goes
     assert known.bodies.moving.tolist() == [goes]
 
 
-def test_what_stood_where_something_stood_is_not_believed_before_it_was_measured_for_as_long() -> None:
+def test_new_track_where_something_stood_needs_its_own_time_of_measurement() -> None:
     pallet = measured(box(1.6, 0.1, top_m=0.1, sigma_mps=0.1, age_s=0.6), 0.6)
     renumbered = replace(pallet, tracked_s=np.array([0.4]))
     for before, goes in ((pallet, True), (renumbered, False)):

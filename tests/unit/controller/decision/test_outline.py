@@ -176,7 +176,7 @@ def cut(seen: FreeSpace) -> FreeSpace:
     return FreeSpace(bearing, seen.half_width_tan, nearest, known)
 
 
-def test_what_was_seen_whole_is_passed_while_it_leaves_the_view() -> None:
+def test_body_seen_whole_is_passed_while_it_leaves_the_view() -> None:
     """What is left of it in view could be the edge of something larger."""
     part, seen = crate(HALF_DIAGONAL_M, CRATE_Y_M + 0.5 * HALF_DIAGONAL_M), depth(corner_on=True)
     bench = Bench()
@@ -185,7 +185,7 @@ def test_what_was_seen_whole_is_passed_while_it_leaves_the_view() -> None:
     assert look(Bench(), part, cut(seen)).reason.rule == "static"
 
 
-def test_what_lies_beside_a_band_without_depth_may_go_on_there() -> None:
+def test_body_beside_a_band_without_depth_may_extend_into_it() -> None:
     """The same, where the image is wider than what depth is measured of."""
     part, seen = crate(HALF_DIAGONAL_M, CRATE_Y_M + 0.5 * HALF_DIAGONAL_M), cut(depth(corner_on=True))
     last = np.arange(len(seen.nearest_m)) >= len(seen.nearest_m) - 2
@@ -194,7 +194,7 @@ def test_what_lies_beside_a_band_without_depth_may_go_on_there() -> None:
     assert look(Bench(), part, blind).reason.rule == "static"
 
 
-def test_what_goes_in_between_has_to_be_seen_whole_again() -> None:
+def test_body_that_moved_meanwhile_has_to_be_seen_whole_again() -> None:
     """Nothing else stands there, so that no outline is taken while it goes."""
     part, seen = crate(HALF_DIAGONAL_M, CRATE_Y_M + 0.5 * HALF_DIAGONAL_M), depth(corner_on=True)
     bench = Bench()
@@ -203,7 +203,7 @@ def test_what_goes_in_between_has_to_be_seen_whole_again() -> None:
     assert look(bench, part, cut(seen)).reason.rule == "static"
 
 
-def test_what_then_shows_in_the_way_is_stopped_for() -> None:
+def test_robot_stops_for_a_part_that_shows_on_the_path_later() -> None:
     """The crate was the end of something longer, which goes on into the way."""
     part, seen = crate(HALF_DIAGONAL_M, CRATE_Y_M + 0.5 * HALF_DIAGONAL_M), depth(corner_on=True)
     bench = Bench()
@@ -229,7 +229,7 @@ def test_on_another_path_what_stands_is_placed_anew_without_a_new_scene() -> Non
     assert limit.reason.rule == "static"
 
 
-def test_what_was_seen_along_one_path_says_nothing_of_another() -> None:
+def test_outline_seen_along_one_path_does_not_count_for_another() -> None:
     part, seen = crate(HALF_DIAGONAL_M, CRATE_Y_M + 0.5 * HALF_DIAGONAL_M), depth(corner_on=True)
     bench = Bench()
     look(bench, crate(), seen)

@@ -131,14 +131,14 @@ def test_an_oncoming_one_takes_room_while_the_robot_brakes_only() -> None:
     assert stops_in_time(0.0, reached(box(2.5, 0.0, -1.0, 0.0)))
 
 
-def test_who_is_past_something_needs_no_room_before_it() -> None:
+def test_robot_past_a_body_needs_no_room_before_it() -> None:
     """Its far end is at 5.2 m; the robot's rear, 0.5 m behind, leaves it at 5.9 m with a margin of 0.2 m."""
     standing = reached(box(5.0, 0.0))
     assert not stops_in_time(1.0, standing, s_m=5.6)
     assert stops_in_time(1.0, standing, s_m=6.0)
 
 
-def test_what_is_never_in_the_way_takes_no_room() -> None:
+def test_body_that_is_never_on_the_path_takes_no_room() -> None:
     assert stops_in_time(1.5, reached(box(5.0, 2.0, -1.0, 0.0)), s_m=4.5)
 
 
@@ -152,7 +152,7 @@ def test_getting_through_before_it_comes() -> None:
     assert not passes_clear(go(0.5, 0.5), 0.0, TIMES, crosser)
 
 
-def test_what_may_happen_along_and_across_is_told_apart() -> None:
+def test_spread_across_the_path_reaches_it_and_spread_along_does_not() -> None:
     """0.5 m/s more along the path brings nobody into it, 0.5 m/s across it does."""
     body = box(5.0, 0.65 + 0.9, 0.01, 0.0)
     assert not grown(body, manoeuvres(spread_mps=(0.5, 0.0))).inside.any()

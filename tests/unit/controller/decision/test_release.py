@@ -54,7 +54,7 @@ def test_a_rising_target_waits_for_a_free_way() -> None:
     assert gate.hold(0.2, 0.06) == 0.2
 
 
-def test_what_is_far_above_the_speed_is_waited_for_less_long() -> None:
+def test_release_to_a_much_higher_speed_waits_less_long() -> None:
     gate = Gate(0.0)
     gate.step(1.0)
     gate.hold(0.0, 3.0)

@@ -97,7 +97,7 @@ def test_it_stays_where_not_all_of_its_place_is_free(distance_m: float, what: st
         replace(strip(), moving=np.array([True])),
     ],
 )
-def test_what_would_not_be_seen_there_and_who_moves_stays(body: Bodies) -> None:
+def test_mover_or_body_that_would_not_be_visible_stays(body: Bodies) -> None:
     assert gone_after_s(body, ALL_FREE) is None
 
 

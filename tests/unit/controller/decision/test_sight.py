@@ -99,7 +99,7 @@ def test_one_frame_does_not_brake_and_three_do() -> None:
     assert watch.look(free(nearest_m=2.0)).surface_s_m == pytest.approx(2.4)
 
 
-def test_what_a_tracked_obstacle_explains_is_not_counted_twice() -> None:
+def test_surface_of_a_tracked_obstacle_is_not_counted_twice() -> None:
     person = np.where(np.abs(BEARING) < 0.1, 4.0, math.inf)
     assert Watch().look(free(person), times=5, explained=box(4.6, 0.0)).surface_s_m == math.inf
     assert Watch().look(free(person), times=5, explained=box(6.5, 0.0)).surface_s_m == pytest.approx(4.4)
@@ -218,7 +218,7 @@ def test_floor_too_near_to_be_measured_was_not_seen_by_seeing_beyond_it() -> Non
     assert watch.look(beyond, s_m=8.0).known_s_m > 15.0
 
 
-def test_what_is_below_the_view_of_a_high_camera_is_free_by_consent_at_the_start_only() -> None:
+def test_floor_below_the_view_is_assumed_free_only_at_the_start() -> None:
     """1.9 m ahead of it the floor comes into view, and not 1.3 m."""
     high, blind = replace(free(), floor_from_m=1.9), replace(free(known_m=0.0), floor_from_m=1.9)
     assert Watch().look(replace(blind, floor_from_m=1.0)).known_s_m == pytest.approx(0.4 + 1.3 + 0.2, abs=0.2)
@@ -271,7 +271,7 @@ def test_a_surface_that_rises_above_the_view_of_a_low_camera_is_still_there() ->
         assert (after.surface_s_m < 6.0) == held
 
 
-def test_what_flickers_far_away_is_not_held_for_the_sake_of_the_upper_edge() -> None:
+def test_flickering_far_surface_is_not_held_by_the_upper_edge_of_the_view() -> None:
     watch = Watch()
     assert watch.look(replace(free(5.0, 5.0), up_tan=-0.1), times=5).surface_s_m == pytest.approx(
         5.4, abs=0.1

@@ -39,7 +39,7 @@ def test_noise_far_away_is_averaged_out() -> None:
     assert np.mean(found[50:]) == pytest.approx(-1.0, abs=0.05)
 
 
-def test_what_is_measured_well_is_followed_at_once() -> None:
+def test_well_measured_velocity_is_followed_at_once() -> None:
     steady = SteadyVelocities()
     for frame in range(1, 20):
         steady.update(seen(frame, -1.0, 0.0, 0.03))
@@ -52,7 +52,7 @@ def test_what_is_measured_well_is_followed_at_once() -> None:
     assert found.innovation_mps[0, 1] == pytest.approx(2.0 * (left_mps - 0.5 * 0.03))
 
 
-def test_what_gathers_speed_is_reckoned_to_go_on_doing_so() -> None:
+def test_accelerating_body_is_expected_to_get_faster() -> None:
     """It sets off at 1.3 m/s^2, measured 0.15 s late: faster than measured, though not faster than it is."""
     steady = SteadyVelocities()
     for frame in range(1, 21):
@@ -71,14 +71,14 @@ def test_noise_is_no_surprise() -> None:
     assert steady.update(seen(61, -1.0, -0.5, 0.1)).innovation_mps[0, 1] < -0.3
 
 
-def test_who_stood_begins_anew() -> None:
+def test_velocity_average_of_a_body_that_stood_starts_anew() -> None:
     steady = SteadyVelocities()
     steady.update(seen(1, -1.0, 0.0, 0.3))
     steady.update(seen(2, 0.0, 0.0, 0.3))
     assert steady.update(seen(3, 0.8, 0.0, 0.3)).velocity_mps[0, 0] == pytest.approx(0.8)
 
 
-def test_who_stood_and_sets_off_may_reach_a_walking_speed() -> None:
+def test_body_that_stood_and_sets_off_may_reach_a_walking_speed() -> None:
     """1.2 m/s, along the way on which it sets off, for a second."""
     steady = SteadyVelocities()
     for frame in range(1, 31):
@@ -89,11 +89,11 @@ def test_who_stood_and_sets_off_may_reach_a_walking_speed() -> None:
     )
 
 
-def test_who_is_as_fast_as_that_already_gets_no_faster() -> None:
+def test_body_that_sets_off_at_walking_speed_gets_no_faster() -> None:
     assert not SteadyVelocities().update(seen(1, -1.0, 0.8, 0.05, stood_s=1.0)).innovation_mps.any()
 
 
-def test_who_was_never_seen_to_stand_does_not_set_off() -> None:
+def test_body_that_was_never_seen_to_stand_does_not_set_off() -> None:
     assert not SteadyVelocities().update(seen(9, -0.3, 0.4, 0.05)).innovation_mps.any()
     steady = SteadyVelocities()
     for frame in range(1, 20):

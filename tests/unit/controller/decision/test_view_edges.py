@@ -60,9 +60,7 @@ def after_a_pallet(floor_from_m: float) -> WorldModel:
 
 
 @pytest.mark.parametrize(("floor_from_m", "near_m"), [(0.0, 1.3), (1.2, 1.3), (1.9, 1.9)])
-def test_what_sinks_below_the_view_is_kept_however_far_ahead_the_view_begins(
-    floor_from_m: float, near_m: float
-) -> None:
+def test_body_that_sinks_below_the_view_is_kept(floor_from_m: float, near_m: float) -> None:
     known = after_a_pallet(floor_from_m)
     assert known.edges.near_m == near_m
     assert known.remembered.tolist() == ([True] if floor_from_m > 1.6 else [])
@@ -103,7 +101,7 @@ def after_a_beam(up_tan: float, bottom_m: float = 0.65, ahead_m: float = 0.9) ->
         (math.inf, 0.65, 0.9, False),  # nobody knows of an upper edge
     ],
 )
-def test_what_rises_above_the_view_is_kept(
+def test_body_that_rises_above_the_view_is_kept(
     up_tan: float, bottom_m: float, ahead_m: float, kept: bool
 ) -> None:
     known = after_a_beam(up_tan, bottom_m, ahead_m)
@@ -122,7 +120,7 @@ def test_a_camera_at_the_height_of_what_hangs_above_the_robot_sees_the_floor_und
 
 
 @pytest.mark.parametrize(("up_tan", "off_m"), [(math.inf, 0.0), (0.39, 1.28), (0.2, 2.5), (0.05, 3.0)])
-def test_what_hangs_is_stood_off_so_far_that_its_going_is_seen(up_tan: float, off_m: float) -> None:
+def test_robot_stops_far_enough_to_see_a_hanging_body(up_tan: float, off_m: float) -> None:
     """Its underside at 0.65 m has to be 0.1 m below the upper edge of a camera at 0.25 m; 3 m at most."""
     beam = box(8.0, 0.0, top_m=0.85, bottom_m=0.65)
     found = visible_from_m(beam, np.zeros(1), 0.25, ViewEdges(0.5, 1.3, up_tan))[0]

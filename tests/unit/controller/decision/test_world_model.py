@@ -42,7 +42,7 @@ def age_s(y_m: float, seen_s: float) -> float:
     return float(bodies.age_s.item())
 
 
-def test_what_stands_where_something_stood_is_no_newcomer() -> None:
+def test_body_where_one_stood_before_keeps_its_age() -> None:
     assert age_s(0.1, 0.03) == 0.5
     assert age_s(1.0, 0.03) == pytest.approx(0.03)
     assert age_s(0.1, 2.0) == 2.0

@@ -43,7 +43,7 @@ def limit(lo_m: float, age_s: float, confirm_s: float) -> Limit | None:
 
 
 @pytest.mark.parametrize("confirm_s", [1.0, 2.0])
-def test_what_is_hardly_seen_counts_from_where_it_can_still_be_confirmed_first(confirm_s: float) -> None:
+def test_young_body_counts_once_there_is_no_room_left_to_confirm_it(confirm_s: float) -> None:
     """Until it is confirmed the robot goes on; the hard stop after that must still fit."""
     v_mps = LIMITS.max_speed_mps
     stop_m = braking.stop(v_mps, 0.0, braking.emergency(LIMITS)).distance_m
@@ -64,7 +64,7 @@ def beside(x_m: float, unseen_s: float) -> Limit | None:
     return asked(worst, body, 0.5)
 
 
-def test_who_is_out_of_sight_is_where_it_is_reckoned_only_as_well_as_its_speed_was_known() -> None:
+def test_position_of_an_unseen_body_is_as_uncertain_as_its_velocity() -> None:
     """In 2 s twice 0.15 m/s may add up to 0.6 m of those 0.75."""
     assert beside(2.0, 0.0) is None
     found = beside(2.0, 2.0)
@@ -72,7 +72,7 @@ def test_who_is_out_of_sight_is_where_it_is_reckoned_only_as_well_as_its_speed_w
     assert found.speed_mps < 0.5
 
 
-def test_who_is_reckoned_to_be_beside_the_robot_may_still_be_ahead_of_it() -> None:
+def test_unseen_body_expected_beside_the_robot_may_still_be_ahead() -> None:
     """Its near side 0.2 m behind the robot's front."""
     assert beside(0.5, 0.0) is None
     assert beside(0.5, 2.2) is not None

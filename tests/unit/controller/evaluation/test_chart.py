@@ -65,7 +65,7 @@ def test_a_line_is_interrupted_where_nothing_is_known() -> None:
     assert not marks[round(gap[1]), round(gap[0])]
 
 
-def test_what_is_too_high_stays_inside_of_the_frame() -> None:
+def test_line_beyond_the_axis_is_clipped_to_the_frame() -> None:
     image, drawn = chart()
     drawn.line([1.0, 2.0], [5.0, 5.0], BLUE)
     rows = np.flatnonzero(painted(image, BLUE).any(axis=1))

@@ -63,11 +63,11 @@ def test_each_detection_goes_to_one_object() -> None:
         ({"speed_mps": 0.0}, Eligibility.STILL),
     ],
 )
-def test_who_must_be_found(change: dict[str, Any], standing: Eligibility) -> None:
+def test_eligibility_of_an_object(change: dict[str, Any], standing: Eligibility) -> None:
     assert judge_eligibility(truths([[true_object(**change)]]))[0][1].eligibility is standing
 
 
-def test_who_has_just_stopped_is_excused_for_half_a_second() -> None:
+def test_object_that_has_just_stopped_is_excused_for_half_a_second() -> None:
     frames = [[true_object()]] + [[true_object(speed_mps=0.0)]] * 20
     standings = [call[1].eligibility for call in judge_eligibility(truths(frames))]
     assert standings[1:16] == [Eligibility.EXCUSED] * 15
@@ -109,7 +109,7 @@ def test_three_frames_make_a_wrong_object(times: int, wrong: tuple[int, ...]) ->
     assert sum(len(frame.wrong) for frame in scored.frames) == times
 
 
-def test_what_is_not_called_moving_is_never_wrong() -> None:
+def test_detection_below_the_threshold_is_never_wrong() -> None:
     frames = [[far_detection(confidence=0.49)]] * 10
     assert score(truths([[]] * 10), answers(frames)).wrong_objects == ()
     assert score(truths([[]] * 10), answers(frames), threshold=0.4).wrong_objects == (9,)

@@ -39,7 +39,7 @@ def test_the_corner_of_the_body() -> None:
         (Twist(0.0, -9.0), Wish(Kind.TURN, 0.8 * corner_m(ROBOT), left=-1)),
     ],
 )
-def test_what_a_twist_asks_for(twist: Twist, wish: Wish) -> None:
+def test_twist_gives_its_kind_speed_and_curvature(twist: Twist, wish: Wish) -> None:
     understood = understand(twist, ROBOT)
     assert understood.kind is wish.kind
     assert understood.speed_mps == pytest.approx(wish.speed_mps)
@@ -56,7 +56,7 @@ def test_what_a_twist_asks_for(twist: Twist, wish: Wish) -> None:
         (Twist(0.5, math.inf), "not a number"),
     ],
 )
-def test_what_is_refused_and_why(twist: Twist, why: str) -> None:
+def test_bad_twist_is_refused_with_its_reason(twist: Twist, why: str) -> None:
     wish = understand(twist, ROBOT)
     assert (wish.kind, wish.speed_mps) == (Kind.REFUSED, 0.0)
     assert why in wish.why

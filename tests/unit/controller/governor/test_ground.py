@@ -128,7 +128,7 @@ def test_a_low_thing_that_went_below_the_view_is_still_there() -> None:
     assert robot.blocked(1.85, 0.0)
 
 
-def test_what_moved_leaves_no_lasting_mark() -> None:
+def test_moving_body_leaves_no_lasting_mark() -> None:
     robot = Walkabout()
     robot.look(scan(nearest_m=2.0), times=5, moving=box(2.6, 0.0, 0.0, 1.0, half_across_m=3.0))
     assert robot.blocked(2.45, 0.0)
@@ -137,7 +137,7 @@ def test_what_moved_leaves_no_lasting_mark() -> None:
     assert not robot.blocked(2.45, 0.0)
 
 
-def test_what_leaves_the_view_of_a_standing_robot_has_gone_but_what_stays_is_kept_when_it_drives_on() -> None:
+def test_surface_that_vanishes_before_a_standing_robot_is_forgotten_and_others_are_kept() -> None:
     robot = Walkabout()
     robot.look(scan(nearest_m=2.0, ahead_only=0.2), times=5, standing=False)
     robot.look(scan(nearest_m=2.0, ahead_only=0.2), times=10, standing=True)
@@ -219,9 +219,7 @@ def test_a_cell_that_comes_to_hold_another_place_keeps_nothing_of_the_old_one() 
 
 
 @pytest.mark.parametrize(("floor_from_m", "kept"), [(0.0, False), (2.0, True)])
-def test_what_sinks_below_the_view_of_a_high_camera_is_not_seen_to_be_gone(
-    floor_from_m: float, kept: bool
-) -> None:
+def test_surface_below_the_view_of_a_high_camera_is_kept(floor_from_m: float, kept: bool) -> None:
     """A pallet that was seen 2.1 m ahead of the camera, and no more from 1.95 m on."""
     walk = Walkabout()
     for x_m in (0.0, 0.1, 0.2):

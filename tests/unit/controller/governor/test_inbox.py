@@ -124,7 +124,7 @@ def test_a_burst_that_comes_at_once_has_not_kept_coming() -> None:
     ("seq", "t_ms", "kind"),
     [(5, 30, "duplicate"), (4, 30, "out of order"), (6, 10, "clock went back")],
 )
-def test_what_is_out_of_turn_is_dropped_and_told_once(seq: int, t_ms: float, kind: str) -> None:
+def test_datagram_out_of_sequence_is_dropped_and_reported_once(seq: int, t_ms: float, kind: str) -> None:
     talk = Talk()
     talk.say(5, 20, 0.4)
     talk.poll(0)
@@ -136,7 +136,7 @@ def test_what_is_out_of_turn_is_dropped_and_told_once(seq: int, t_ms: float, kin
     assert kind in talk.warnings[0]
 
 
-def test_what_is_dropped_keeps_nobody_driving() -> None:
+def test_dropped_datagrams_do_not_keep_the_robot_driving() -> None:
     talk = Talk()
     talk.say(5, 0)
     talk.poll(0)

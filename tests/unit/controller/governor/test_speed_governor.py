@@ -90,7 +90,7 @@ def test_reverse_is_refused_with_its_reason() -> None:
 
 
 @pytest.mark.parametrize("twist", [Twist(math.nan, 0.0), Twist(0.5, math.inf), Twist(0.1, 0.6)])
-def test_what_cannot_be_driven_stops_it(twist: Twist) -> None:
+def test_twist_that_cannot_be_driven_stops_the_robot(twist: Twist) -> None:
     steps = GovernedDrive(lambda t: Twist(0.6, 0.0) if t < 4.0 else twist).run(9.0)
     assert steps[-1].governed.v_mps == 0.0
     assert rules(steps)[-1] == "refused"
@@ -270,7 +270,7 @@ def test_nothing_is_learned_of_the_floor_from_a_camera_that_cannot_be_trusted() 
     assert (ground.blocked(crate, round(drive.t_s * NS_PER_S)).sum(), ground.free(behind).sum()) == seen
 
 
-def test_who_has_left_the_view_is_remembered_through_every_new_arc() -> None:
+def test_body_out_of_view_is_remembered_through_every_new_arc() -> None:
     """Somebody slower beside the way is overtaken; out of view he may step in for 2 s at least."""
     drive = GovernedDrive(always(0.8), [Box(walking(4.5, 1.9, 0.35, -0.02))])
     arcs, remembered = set(), []

@@ -45,7 +45,7 @@ def warning(config: Path) -> str | None:
 
 
 @pytest.mark.parametrize("robot", ROBOTS, ids=lambda path: path.stem)
-def test_what_ships_can_be_seen_round(robot: Path) -> None:
+def test_shipped_paths_have_no_blind_bend(robot: Path) -> None:
     assert warning(robot) is None
 
 

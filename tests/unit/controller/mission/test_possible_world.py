@@ -57,7 +57,7 @@ def test_a_crate_on_the_way_and_a_beam_overhead_are_possible(tmp_path: Path, x: 
         (3.1, 4.0, "path.start: at x 3.1, y 0 the robot already touches the body 'box'; move either"),
     ],
 )
-def test_what_nobody_could_drive_is_refused_with_its_place(
+def test_undrivable_world_is_refused_with_its_place(
     tmp_path: Path, x: float, length: float, told: str
 ) -> None:
     with pytest.raises(ConfigError) as refused:

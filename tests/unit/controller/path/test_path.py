@@ -96,7 +96,7 @@ def test_points_beside_lines_and_arcs() -> None:
     assert d[4] == pytest.approx(-1.6)
 
 
-def test_what_goes_on_is_where_a_point_there_would_be() -> None:
+def test_moving_point_is_located_like_a_point_at_its_later_place() -> None:
     """Along the first line alone, and where bends are looked at."""
     points, velocity = np.array([[2.0, 0.7], [4.0, 1.2]]), np.array([[0.2, 0.3], [0.5, -0.4]])
     times = np.array([0.0, 0.5, 2.0])
@@ -110,7 +110,7 @@ def test_what_goes_on_is_where_a_point_there_would_be() -> None:
 
 
 @pytest.mark.parametrize("to_s_m", [3.5, 9.0])
-def test_what_is_nowhere_is_nowhere_along_the_path(to_s_m: float) -> None:
+def test_nan_point_has_no_place_along_the_path(to_s_m: float) -> None:
     s, d = HOOK.project_points(np.array([[math.nan, 1.0], [1.0, 1.0]]), 0.0, to_s_m)
     assert math.isnan(d[0])
     assert (s[1], d[1]) == pytest.approx((1.0, 1.0))

@@ -85,7 +85,7 @@ def test_or_from_where_a_base_outside_of_this_program_reports_to_be(
     assert (pose.x_m, pose.y_m, pose.heading_rad) == pytest.approx((2.0, 3.5, math.pi / 2))
 
 
-def test_what_the_base_reports_is_of_the_time_for_which_it_says_so(
+def test_odometry_counts_at_the_stamp_of_the_base(
     ends: tuple[RemoteBody, Channel],
 ) -> None:
     """A slow step asks it long after it has begun."""

@@ -88,7 +88,7 @@ def decide_slowly(takes_ms: float) -> list[ChassisState]:
     return states
 
 
-def test_what_was_decided_long_ago_is_not_sent() -> None:
+def test_command_of_an_old_decision_is_not_sent() -> None:
     states = decide_slowly(400.0)
     assert states[59].mode is ChassisMode.ARMED
     assert states[59].v_mps > 0.1

@@ -122,7 +122,7 @@ def test_the_service_manager_is_told_of_every_end_before_perception_is_waited_fo
     assert told == [b"STOPPING=1\nSTATUS=" + why]
 
 
-def test_what_ends_during_the_drive_and_after_it_is_told_once_each(
+def test_process_that_ends_during_or_after_the_drive_is_reported_once(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     link: list[PerceptionLink] = []
@@ -179,7 +179,7 @@ def test_files_that_a_killed_perception_may_not_have_closed_are_named(
     assert link.cut_off == (why if recorded else [])
 
 
-def test_what_perception_tells_after_the_drive_is_heard(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_message_of_perception_after_the_drive_is_received(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(realtime_rig, "perceive_forever", tells_late)
     path = CONFIG_DIR / "sim-realtime.yaml"
     with perception_beside(load_app(path), Path(path), 0, RecordingOptions()) as link:

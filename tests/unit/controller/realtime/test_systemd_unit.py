@@ -72,7 +72,7 @@ def test_ports_and_cameras_may_be_opened(group: str) -> None:
     assert f"DeviceAllow=char-{group} rw" in UNIT.read_text().splitlines()
 
 
-def test_what_it_compiles_at_its_first_start_can_be_kept_and_waited_for() -> None:
+def test_service_can_keep_its_compiled_code_and_waits_for_the_first_start() -> None:
     """The project's folder and the user's home may not be written to by the service."""
     lines = UNIT.read_text().splitlines()
     kept = next(line for line in lines if line.startswith("Environment=NUMBA_CACHE_DIR="))

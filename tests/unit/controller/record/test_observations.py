@@ -54,7 +54,7 @@ def test_a_recorded_time_keeps_its_microseconds() -> None:
     assert observation(scene(captured_ns=1_305_031_236_733_922_000), None, {})["stamp"] == 1305031236.733922
 
 
-def test_what_is_not_known_is_null_not_zero() -> None:
+def test_unknown_value_is_null_not_zero() -> None:
     seen = scene(obstacles=(obstacle(velocity_mps=(math.nan, 0.0, math.inf)),))
     assert observation(seen, None, {})["obstacles"][0]["velocity"] == [None, 0.0, None]
 
@@ -69,7 +69,7 @@ def test_the_file_holds_one_json_line_a_frame(tmp_path: Path) -> None:
     assert lines[1]["decision"] is None
 
 
-def test_what_was_in_the_file_goes_with_the_first_line_and_not_before(tmp_path: Path) -> None:
+def test_old_content_is_replaced_by_the_first_line_and_not_before(tmp_path: Path) -> None:
     path = tmp_path / "out.jsonl"
     path.write_text("of the last run\n")
     with ObservationFile(path):

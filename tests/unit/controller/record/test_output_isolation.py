@@ -64,7 +64,7 @@ def test_a_run_that_moves_nothing_ends(tmp_path: Path) -> None:
         record(recorder, 1)
 
 
-def test_what_fails_at_the_very_end_is_told_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_failure_at_the_very_end_is_reported_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever ended the drive: the error that perception ends with hides nothing."""
     told: list[str] = []
 

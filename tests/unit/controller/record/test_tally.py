@@ -85,7 +85,7 @@ def test_a_driver_that_sends_every_second_setpoint_has_the_same_jitter() -> None
     assert tally.violations == 1, "two steps in one period are one too many"
 
 
-def test_what_was_not_sent_and_what_was_sent_before_count_nothing() -> None:
+def test_missing_and_repeated_setpoints_are_not_counted() -> None:
     tally = SetpointTally(LIMITS, period_s=0.02)
     point = Setpoint(0, 0.1, 0.0, 0.0)
     for sent in (None, point, point):
@@ -117,7 +117,7 @@ def test_the_first_command_after_a_latch_is_judged() -> None:
     assert tally.violations == 1
 
 
-def test_what_is_beyond_comfort_is_told_apart() -> None:
+def test_commands_beyond_comfort_are_counted_by_kind() -> None:
     def beyond(*sent: tuple[float, float]) -> tuple[int, int, int]:
         tally = tally_of(*sent)
         return tally.emergency_count, tally.hard_braking_count, tally.high_jerk_count

@@ -41,7 +41,7 @@ def test_a_robot_that_does_not_get_on_says_why_ever_more_rarely(capsys: pytest.C
     ]
 
 
-def test_what_the_base_complains_of_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+def test_complaints_of_the_base_are_shown(capsys: pytest.CaptureFixture[str]) -> None:
     Console(quiet=False).complaints(12.5, ["warning: board warm", "battery low"])
     assert capsys.readouterr().out.splitlines() == [
         "  12.50 s  the base says: warning: board warm",

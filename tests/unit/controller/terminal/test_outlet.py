@@ -20,7 +20,7 @@ def returns(speak: Callable[[], None]) -> bool:
     return not thread.is_alive()
 
 
-def test_what_was_said_is_written_in_order_before_the_outlet_is_closed(
+def test_output_is_written_in_order_before_the_outlet_closes(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     with Outlet() as outlet:
@@ -32,7 +32,7 @@ def test_what_was_said_is_written_in_order_before_the_outlet_is_closed(
     assert said.err == "[###]"
 
 
-def test_who_stops_reading_holds_nobody_up_and_learns_how_much_was_left_out(
+def test_stalled_reader_blocks_nobody_and_is_told_how_much_was_left_out(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     reader, writer = os.pipe()
@@ -51,7 +51,9 @@ def test_who_stops_reading_holds_nobody_up_and_learns_how_much_was_left_out(
     assert "lines were not read and left out" in left_out
 
 
-def test_who_never_reads_again_does_not_keep_a_drive_from_ending(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_reader_that_never_reads_again_does_not_block_the_end(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     reader, writer = os.pipe()
     with os.fdopen(writer, "w") as unread:
         monkeypatch.setattr("sys.stdout", unread)
@@ -70,7 +72,7 @@ def test_who_never_reads_again_does_not_keep_a_drive_from_ending(monkeypatch: py
         assert not outlet._thread.is_alive()
 
 
-def test_what_cannot_be_shown_is_spelled_out(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_characters_that_the_terminal_cannot_show_are_escaped(monkeypatch: pytest.MonkeyPatch) -> None:
     shown = io.BytesIO()
     with io.TextIOWrapper(shown, encoding="latin-1", write_through=True) as narrow:
         monkeypatch.setattr("sys.stdout", narrow)

@@ -100,7 +100,7 @@ def test_a_mission_that_gets_on_says_nothing_of_standing(capsys: pytest.CaptureF
     assert "standing" not in dict(summary_rows(load_app(CONFIG_PATH), result))
 
 
-def test_what_the_base_complains_of_is_told_once_and_at_the_end(capsys: pytest.CaptureFixture[str]) -> None:
+def test_complaint_of_the_base_is_shown_once_and_in_the_summary(capsys: pytest.CaptureFixture[str]) -> None:
     assert "base" not in dict(summary_rows(load_app(CONFIG_PATH), drive(1.0, sees=True)))
     result = drive(1.0, sees=True, chassis=WarmChassis())
     assert capsys.readouterr().out.count("the base says: warning: board warm (battery 48.0 V)") == 1

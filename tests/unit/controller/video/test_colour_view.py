@@ -68,7 +68,7 @@ def test_around_a_wider_image_the_panel_is_empty() -> None:
     assert image[80, 320].tolist() == [123, 123, 123]  # 0.82 * 150: the wall
 
 
-def test_what_lies_in_a_wider_image_moves_with_it() -> None:
+def test_fragments_of_a_wider_image_are_scaled_with_it() -> None:
     wide = Intrinsics(1280, 720, 900.0, 900.0, 639.5, 359.5)
     segment = build.fragments(np.array([[[200.0, 200.0], [400.0, 200.0]]]), [True], [True])
     moment = build.moment(seen_fragments=segment)
@@ -105,7 +105,7 @@ def test_an_obstacle_has_its_box_and_a_label(moving: bool, colour: Colour) -> No
     assert (above == colour).all(axis=2).any()
 
 
-def test_what_moves_has_the_thicker_box() -> None:
+def test_mover_has_the_thicker_box() -> None:
     def thickness(moving: bool) -> int:
         thing = build.obstacle(3, 5.0, 0.0, moving=moving, size_m=(0.6, 0.7))
         u0, v0, _, v1 = (round(edge) for edge in thing.bbox_px)
@@ -128,7 +128,7 @@ def test_an_obstacle_that_is_only_predicted_is_dashed() -> None:
     assert 0.2 < inked_share(0.3) < 0.8
 
 
-def test_what_is_not_seen_now_is_drawn_where_it_is_predicted_to_be() -> None:
+def test_unseen_obstacle_is_drawn_at_its_predicted_place() -> None:
     # Seen last at the left; a metre to the right by now. Level, so that its surface is as the box was.
     old = build.obstacle(3, 4.0, 0.5, size_m=(0.6, 0.9))
     now = build.obstacle(3, 4.0, -0.5, size_m=(0.6, 0.9))
@@ -146,7 +146,7 @@ def test_what_is_not_seen_now_is_drawn_where_it_is_predicted_to_be() -> None:
 
 
 @pytest.mark.parametrize("z_m", [-1.0, 0.0, math.nan])
-def test_what_is_predicted_to_be_behind_the_camera_has_no_box(z_m: float) -> None:
+def test_obstacle_predicted_behind_the_camera_has_no_box(z_m: float) -> None:
     thing = dataclasses.replace(
         build.obstacle(3, 4.0, 0.0), position_m=np.array([0.0, 0.0, z_m]), unseen_s=0.1
     )
@@ -154,7 +154,7 @@ def test_what_is_predicted_to_be_behind_the_camera_has_no_box(z_m: float) -> Non
     assert not (image == STATIC).all(axis=2).any()
 
 
-def test_what_decides_is_framed() -> None:
+def test_deciding_obstacle_is_framed() -> None:
     thing = build.obstacle(3, 4.0, 0.0, moving=True, size_m=(0.6, 0.9))
     u0, v0, _, v1 = (round(edge) for edge in thing.bbox_px)
 

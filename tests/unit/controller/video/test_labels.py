@@ -70,7 +70,7 @@ def test_there_are_never_more_labels_than_can_be_read() -> None:
     assert len(arrange(crowd, BOUNDS)) == MAX_LABELS
 
 
-def test_what_moves_is_filled_and_what_stands_is_not() -> None:
+def test_label_of_a_mover_is_filled_and_of_a_static_obstacle_is_not() -> None:
     image = np.zeros((300, 400, 3), np.uint8)
     moving = Label("#1", MOVING, np.array([[50.0, 100.0], [90.0, 200.0]]), filled=True)
     static = Label("#2", STATIC, np.array([[250.0, 100.0], [290.0, 200.0]]))

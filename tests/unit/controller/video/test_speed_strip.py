@@ -115,7 +115,7 @@ def test_without_a_decision_nothing_is_marked() -> None:
     assert drawing.close(image, 1.05, 0.5, MEASURED_SPEED)
 
 
-def test_what_is_older_than_the_history_is_forgotten() -> None:
+def test_actions_older_than_the_history_are_not_drawn() -> None:
     drawing = Drawing()
     drawing.add(Action.DECREASE, measured_mps=1.4)
     for _ in range(150):

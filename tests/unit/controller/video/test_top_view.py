@@ -138,7 +138,7 @@ def test_free_space_ends_at_the_nearest_surface() -> None:
     assert pixel(image, foot_m + 2.6, 2.0) == PANEL  # outside the view
 
 
-def test_what_was_not_seen_is_not_free() -> None:
+def test_unseen_floor_is_not_drawn_as_free() -> None:
     image = drawn(build.moment(free=build.free_space(known_m=3.0)))
     foot_m = build.MOUNT.forward_m
     assert pixel(image, foot_m + 2.6, 0.3) == FREE_SPACE
@@ -187,7 +187,7 @@ def test_distances_are_those_over_the_floor_from_the_camera() -> None:
     assert seen.distance_m == pytest.approx(5.0)  # 4 ahead of the camera, 3 to the left
 
 
-def test_what_decides_comes_first_then_what_moves_then_the_nearest() -> None:
+def test_labels_are_sorted_by_deciding_moving_and_nearest() -> None:
     things = (
         build.obstacle(1, 2.0, 0.0),
         build.obstacle(2, 7.0, 0.0),

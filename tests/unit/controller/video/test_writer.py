@@ -33,7 +33,7 @@ def read_back(path: Path) -> list[Image]:
 
 
 @pytest.mark.parametrize("suffix", CODECS)
-def test_what_is_written_can_be_read(tmp_path: Path, suffix: str) -> None:
+def test_written_video_can_be_read(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"drive{suffix}"
     levels = [20, 60, 100, 140, 180, 220]
     with VideoWriter(path, 12.5) as writer:
@@ -226,7 +226,7 @@ def test_a_file_system_that_reserves_nothing_is_asked_for_its_free_space(
     assert len(read_back(path)) == 1
 
 
-def test_what_was_reserved_and_not_needed_is_given_back(tmp_path: Path) -> None:
+def test_unused_reserved_space_is_freed(tmp_path: Path) -> None:
     path = tmp_path / "drive.mp4"
     with VideoWriter(path, 30.0) as writer:
         writer.write(picture(10))

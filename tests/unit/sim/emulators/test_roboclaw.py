@@ -131,7 +131,7 @@ def test_both_lengths_of_the_status(status_bytes: int, reply: str) -> None:
     assert bench.read(90) == bytes.fromhex(reply)
 
 
-def test_what_is_wrong_is_met_with_silence() -> None:
+def test_wrong_packets_are_not_answered() -> None:
     bench = Bench()
     good = write(37, struct.pack(">ii", 500, 500))
     assert bench.ask(good[:-1] + bytes((good[-1] ^ 1,))) == b""

@@ -81,7 +81,7 @@ def test_a_motion_command_drives_each_track(command: bytes, speeds: tuple[float,
         b"hello\r",
     ],
 )
-def test_what_is_wrong_is_refused(wrong: bytes) -> None:
+def test_wrong_commands_are_refused(wrong: bytes) -> None:
     bench = Bench()
     assert bench.drive(wrong) == b"-\r"
     assert bench.plant.track_speeds_mps == STOPPED

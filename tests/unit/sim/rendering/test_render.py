@@ -140,7 +140,7 @@ def test_the_mask_names_the_bodies_of_the_scenario() -> None:
     assert columns.mean() == pytest.approx(K.fx * ahead[0] / ahead[2] + K.cx, abs=8)
 
 
-def test_what_stands_on_the_floor_casts_a_shadow_on_the_floor_alone() -> None:
+def test_body_on_the_floor_casts_a_shadow_on_the_floor_alone() -> None:
     crate = Crate(kind="crate", name="c", x_m=3.0, y_m=0.0, texture="plain")
     high = crate.model_copy(update={"name": "hangs", "z_m": 1.5})
     bare, with_crate, with_high = (Renderer(scene(*b), K).render(0.0, eye()) for b in ((), (crate,), (high,)))

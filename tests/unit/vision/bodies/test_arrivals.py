@@ -40,25 +40,25 @@ def inner(depth_m: FloatArray) -> BoolGrid:
     return mask
 
 
-def test_what_stands_where_the_wall_was_seen_has_arrived() -> None:
+def test_surface_before_a_wall_that_was_seen_has_arrived() -> None:
     found = arrived(memory((0, BACK)), nearest(BODY, BACK))
     assert found[inner(BODY)].all()
     assert not found[BODY == 0.0].any()
 
 
 @pytest.mark.parametrize(("after_s", "still"), [(-0.01, True), (0.01, False)])
-def test_what_has_come_to_rest_has_arrived_for_no_longer_than_it_says(after_s: float, still: bool) -> None:
+def test_surface_at_rest_counts_as_arrived_for_a_limited_time(after_s: float, still: bool) -> None:
     now_ms = round(1e3 * (ARRIVED_UP_TO_S + after_s))
     assert arrived(memory((0, BACK)), nearest(BODY, BACK), now_ms).any() == still
 
 
-def test_what_stood_there_before_has_not() -> None:
+def test_surface_that_was_there_before_has_not_arrived() -> None:
     both = nearest(BODY, BACK)
     assert not arrived(memory((0, both)), both).any()
 
 
 @pytest.mark.parametrize(("age_ms", "known"), [(600, True), (320, True), (200, False)])
-def test_what_was_there_for_a_while_has_stayed(age_ms: int, known: bool) -> None:
+def test_surface_that_was_there_for_a_while_has_stayed(age_ms: int, known: bool) -> None:
     """Half of 0.6 s at least; what was seen later only may have come since."""
     before, now = nearest(BODY, BACK), nearest(BODY, plate(3.0, (0.4, 0.6), (-0.5, 0.5)), BACK)
     grid = grid_of(now)
@@ -70,14 +70,14 @@ def test_what_was_there_for_a_while_has_stayed(age_ms: int, known: bool) -> None
     assert not stayed[new].any()
 
 
-def test_what_was_hidden_or_not_measured_has_not_stayed() -> None:
+def test_surface_that_was_hidden_or_not_measured_has_not_stayed() -> None:
     grid = grid_of(BACK)
     for before in (nearest(BODY, BACK), np.where(BODY > 0.0, 0.0, BACK)):
         stayed = memory((0, before)).changes(grid, grid.valid, AT_ORIGIN, 600 * MS).stayed
         assert not stayed[inner(BODY)].any()
 
 
-def test_what_goes_leaves_nothing_that_has_arrived() -> None:
+def test_surface_uncovered_by_a_leaving_body_has_not_arrived() -> None:
     assert not arrived(memory((0, nearest(BODY, BACK))), BACK).any()
 
 
@@ -109,7 +109,7 @@ def test_a_step_within_the_noise_proves_nothing() -> None:
     assert arrived(memory((0, wall(3.565))), wall(3.2))[1:-1, 1:-1].all()  # 0.032
 
 
-def test_who_walks_a_metre_before_a_wall_has_arrived_five_metres_away() -> None:
+def test_walker_a_metre_before_a_wall_arrives_even_at_five_metres() -> None:
     """A RealSense's depth is off by 0.19 m there, from pixel to pixel; from cell to cell by less."""
     walker = plate(5.0, (-0.3, 0.3), (-0.5, 0.5))
     assert arrived(memory((0, BACK)), nearest(walker, BACK)).any()
@@ -118,7 +118,7 @@ def test_who_walks_a_metre_before_a_wall_has_arrived_five_metres_away() -> None:
 @pytest.mark.parametrize(
     ("age_ms", "known"), [(80, False), (120, True), (280, True), (700, True), (950, False)]
 )
-def test_what_was_seen_too_lately_or_too_long_ago_does_not_count(age_ms: int, known: bool) -> None:
+def test_views_that_are_too_new_or_too_old_do_not_count(age_ms: int, known: bool) -> None:
     """0.2 s ago, give or take half of it, or 0.6 s."""
     assert arrived(memory((0, BACK)), nearest(BODY, BACK), age_ms).any() == known
 
@@ -167,7 +167,7 @@ def test_views_are_kept_no_closer_than_0_06_s() -> None:
     assert not arrived(memory((0, BACK), (70, both)), both, 250).any()
 
 
-def test_what_depth_tells_apart_grows_with_the_square_of_the_distance() -> None:
+def test_depth_resolution_grows_with_the_square_of_the_distance() -> None:
     """0.1 m, and 3.5 sigmas of the difference of two cells whose noise is 0.55 of a pixel's."""
     hand = 0.1 + 3.5 * 2.0**0.5 * 0.55 * 0.0075 * np.array([0.0, 1.0, 16.0])
     np.testing.assert_allclose(memory().resolves_m(np.array([0.0, 1.0, 4.0])), hand)
@@ -187,7 +187,7 @@ def test_at_the_border_of_the_image_there_are_no_neighbours_outside() -> None:
     np.testing.assert_array_equal(found, expected)
 
 
-def test_what_has_arrived_is_told_as_flat_cells_too() -> None:
+def test_arrived_cells_are_returned_as_flat_indices_too() -> None:
     grid = grid_of(nearest(BODY, BACK))
     changes = memory((0, BACK)).changes(grid, grid.valid, AT_ORIGIN, 200 * MS)
     np.testing.assert_array_equal(changes.arrived_cells, np.flatnonzero(changes.arrived))

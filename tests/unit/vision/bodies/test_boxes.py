@@ -49,7 +49,7 @@ def test_how_one_box_lies_to_another_in_the_image(
     assert (lie.stacked[0], lie.within[0]) == (stacked, within)
 
 
-def test_what_is_measured_of_a_grid_agrees_with_its_boxes() -> None:
+def test_boxes_agree_with_the_measured_regions() -> None:
     depth_m = plate(3.0, (-0.5, 0.1), (-0.4, 0.6))
     box = boxes(measure(grid_of(depth_m), labelled(depth_m > 0.0), 1))
     np.testing.assert_allclose(box.low_m[0], [-0.5, -0.4, 3.0], atol=0.06)

@@ -58,7 +58,7 @@ def carve(
     return labels, carving.carve(tracks, looked, labels, measured, arrived, velocities, CONFIG)
 
 
-def test_what_arrived_before_a_wall_is_cut_out_as_a_suspect() -> None:
+def test_arrived_surface_before_a_wall_is_cut_out_as_a_suspect() -> None:
     tracks = one_track()
     _, labels = carve(tracks, PERSON)
     assert len(tracks) == 2
@@ -138,7 +138,7 @@ def test_nothing_is_cut_out_of_something_compact() -> None:
         (0.8, True, 2.0, False),
     ],
 )
-def test_who_comes_up_to_a_table_whose_lines_stand_is_cut_out_of_it(
+def test_person_who_walks_up_to_a_static_table_is_cut_out_of_it(
     width_m: float, stands: bool, no_evidence_s: float, cut: bool
 ) -> None:
     """What has come to rest a moment ago is where free space was, too: that one is left whole, and so is who

@@ -92,7 +92,7 @@ def test_a_few_cells_are_not_divided() -> None:
     assert second_of(grid, sparse, 0) is None
 
 
-def test_what_is_seen_through_a_body_is_not_divided_from_it() -> None:
+def test_part_seen_through_a_body_is_not_divided_from_it() -> None:
     """The far wheels of a cart, 1.2 m behind its front, under it; and not under it."""
     front = nearest(plate(2.0, (-0.4, 0.4), (-0.6, 0.3)), plate(2.0, (-0.4, -0.3), (0.3, 0.7)))
     wheel = plate(3.2, (-0.1, 0.3), (0.6, 1.0))
@@ -112,7 +112,7 @@ def test_what_is_seen_through_a_body_is_not_divided_from_it() -> None:
         (0.9, 0.6, 0.3, True),
     ],
 )
-def test_what_is_low_beside_a_body_is_divided_from_it_if_it_stands(
+def test_low_part_beside_a_body_is_divided_from_it_if_it_stands(
     low_m: float, stayed_m: float, way_m: float, divided: bool
 ) -> None:
     """A trolley before who pushes it, 1.6 m tall, joined by its handle; 0.6 m long."""

@@ -60,7 +60,7 @@ def test_a_mover_is_extended_down_to_where_the_body_around_it_ends() -> None:
     np.testing.assert_allclose(measured.extent_m[0, 1], 1.6, atol=0.06)
 
 
-def test_what_stands_there_measures_what_it_did() -> None:
+def test_standing_track_keeps_its_measures() -> None:
     """These cells may be its own, after all: it has not become half as wide."""
     depth_m = np.where(HEAD | BODY, 4.0, 0.0)
     before = regions.measure(grid_of(depth_m, LEVEL_UP, 1.0), labelled(HEAD, BODY & ~HEAD), 2)

@@ -25,7 +25,7 @@ def test_a_part_seen_through_a_mover_stays_with_it_if_most_of_it_was_there_befor
         np.testing.assert_array_equal(detach(winner, parts, np.array([800, votes]), nowhere), [1, stays])
 
 
-def test_what_a_mover_carries_stays_with_it_while_most_of_it_was_there_before() -> None:
+def test_part_stays_with_its_mover_while_most_of_it_was_there_before() -> None:
     parts, winner = regions(CART, MAST), np.array([1, 1], np.int32)
     nowhere = NOWHERE[:2, :1]
     np.testing.assert_array_equal(detach(winner, parts, np.array([800, 70]), nowhere), [1, 1])

@@ -11,7 +11,8 @@ from hal.types import FloatArray, PlanarPose
 from tests.support.painted import QVGA, Quad, box, drive, record, vector
 from tests.support.painted_room import SIDEWAYS, TOWARDS, look, room
 from tests.unit.vision.depth.test_regions import SHAPE, flat, grid_of
-from vision.depth.regions import hidden_below, measure
+from vision.depth.occlusion import hidden_below
+from vision.depth.regions import measure
 from vision.scene import Obstacle
 
 SCREEN = box(vector(2.0, 0.0, 0.0), vector(0.3, 2.6, 0.9), 20)  # as high as the robot
@@ -27,19 +28,19 @@ def behind_the_screen(velocity_mps: FloatArray | None, frames: int = 14) -> list
 
 
 @pytest.mark.parametrize("velocity_mps", [TOWARDS, SIDEWAYS])
-def test_who_walks_behind_a_screen_is_seen_by_his_upper_part(velocity_mps: FloatArray) -> None:
+def test_walker_behind_a_screen_is_listed_by_the_upper_part(velocity_mps: FloatArray) -> None:
     (walker,) = behind_the_screen(velocity_mps)
     assert walker.moving
     level = vector(-velocity_mps[1], 0.0, velocity_mps[0])
     np.testing.assert_allclose(walker.velocity_mps, level, atol=0.25)
 
 
-def test_who_stands_behind_a_screen_is_not_listed() -> None:
+def test_person_who_stands_behind_a_screen_is_not_listed() -> None:
     """Nor need it be: the screen is in the way before it."""
     assert behind_the_screen(None) == []
 
 
-def test_who_stood_behind_a_screen_and_is_seen_at_the_robots_height_is_listed() -> None:
+def test_standing_person_is_listed_once_the_screen_is_gone() -> None:
     """The screen goes aside: then what was above the robot only reaches down to the floor."""
     screen = box(vector(2.0, 0.0, 0.0), vector(0.3, 1.2, 0.9), 20, vector(0.0, 1.5, 0.0))
     scene = look(record(room() + screen + box(AT_M, BODY_M, 10), drive(), 36, QVGA), True)[-1].scene
@@ -113,7 +114,7 @@ def test_an_arm_that_comes_into_the_view_is_somebody() -> None:
     assert all(len(seen) == 1 for seen in listed[entered:])
 
 
-def test_what_hangs_above_the_robot_is_not_listed_however_it_comes_into_the_view() -> None:
+def test_object_above_the_robot_is_not_listed_however_it_comes_into_view() -> None:
     """Nor where the robot turns towards it, or drives up to it."""
     hanging = box(vector(1.6, 1.1, 0.9), ARM_M, 10)
     assert not any(above_the_robot(hanging, 20))
@@ -129,9 +130,7 @@ def test_what_hangs_above_the_robot_is_not_listed_however_it_comes_into_the_view
         (vector(4.5, 2.75, 2.02), SIDEWAYS),  # from the side, higher than people
     ],
 )
-def test_what_moves_above_the_robot_and_belongs_to_nobody_is_not_listed(
-    front_m: FloatArray, velocity_mps: FloatArray
-) -> None:
+def test_load_that_moves_above_the_robot_is_not_listed(front_m: FloatArray, velocity_mps: FloatArray) -> None:
     load = box(front_m, vector(0.3, 0.6, 0.25), 10, velocity_mps)
     looks = look(record(room() + load, drive(), 40, QVGA), True)
     assert [one for seen in looks for one in seen.scene.obstacles if one.position_m[2] < 5.5] == []

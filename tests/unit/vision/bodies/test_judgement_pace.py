@@ -63,7 +63,7 @@ def test_proof_counts_by_how_well_the_cameras_own_motion_is_borne_out() -> None:
     assert verdict(replace(seen, borne_out=0.25)).evidence[0] == 0.125
 
 
-def test_what_was_shown_is_not_forgotten_while_one_fragment_still_shows_it() -> None:
+def test_evidence_falls_slowly_while_one_fragment_still_moves() -> None:
     half = 0.5
     waiting = judge(by_fragments(ACROSS, 2), np.full(1, half), np.zeros(1, np.bool_), 0.03, SETTINGS)
     assert half - 0.02 < waiting.evidence[0] < half  # two seconds for all of it
@@ -122,7 +122,7 @@ def test_a_mover_whose_centre_does_not_go_is_not_held() -> None:
     assert verdict(came, 1.0, True).evidence[0] == pytest.approx(1.0 - DT_S / 2.0)
 
 
-def test_what_does_not_move_yet_is_not_held() -> None:
+def test_evidence_of_a_static_track_is_not_held() -> None:
     assert verdict(one(ACROSS), 0.5, False).evidence[0] == pytest.approx(0.5 - DT_S / 0.3)
 
 

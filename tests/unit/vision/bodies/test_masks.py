@@ -31,12 +31,12 @@ def test_surfaces_are_the_points_of_the_tracks_and_whose_they_are() -> None:
     np.testing.assert_allclose(before.points_m[2], 3.0)
 
 
-def test_what_stands_is_expected_where_it_was() -> None:
+def test_cells_of_a_static_track_are_predicted_where_they_were() -> None:
     grid = grid_of(nearest(LEFT_M, RIGHT_M))
     np.testing.assert_array_equal(masks.predict(two_surfaces(), BOTH, NO_SHIFT, grid, AT_ORIGIN), TWO)
 
 
-def test_what_moves_is_expected_where_it_goes() -> None:
+def test_cells_of_a_mover_are_predicted_by_its_velocity() -> None:
     """0.4 m at 3 m are ten cells."""
     moved_m = plate(3.0, (-0.4, 0.2), (-0.4, 0.4))
     shift = np.array([[0.4, 0.0, 0.0], [0.0, 0.0, 0.0]])
@@ -109,7 +109,7 @@ def test_of_two_that_are_as_near_the_last_one_has_the_cell() -> None:
 
 
 @pytest.mark.parametrize("way_m", [(-0.4, 0.0), (0.4, 0.0), (0.0, -0.4), (0.0, 0.4)])
-def test_what_leaves_the_image_comes_in_nowhere(way_m: tuple[float, float]) -> None:
+def test_cells_that_leave_the_image_are_not_predicted_at_the_other_side(way_m: tuple[float, float]) -> None:
     """The whole image is one track's, and ten columns or rows of it go out: of so many at the other side
     nothing is known."""
     grid = grid_of(wall(3.0))
@@ -122,7 +122,7 @@ def test_what_leaves_the_image_comes_in_nowhere(way_m: tuple[float, float]) -> N
     np.testing.assert_array_equal(found, expected)
 
 
-def test_what_is_closer_than_a_hand_or_behind_the_camera_is_expected_nowhere() -> None:
+def test_points_too_close_or_behind_the_camera_are_not_predicted() -> None:
     points_m = np.array([[0.0, 0.0], [0.0, 0.0], [0.1, -3.0]], np.float32)
     before = masks.TrackSurfaces(points_m, np.array([0, 1], np.int32), IDS, AT_ORIGIN)
     assert not masks.predict(before, BOTH, NO_SHIFT, grid_of(wall(3.0)), AT_ORIGIN).any()

@@ -114,7 +114,7 @@ def test_a_piece_above_a_mover_with_exactly_its_velocity_is_carried_by_it() -> N
     assert merged(CART, MAST, sigma=0.4) == []  # not known well enough
 
 
-def test_what_is_seen_through_a_mover_and_goes_much_as_it_does_is_its_own() -> None:
+def test_part_behind_a_mover_with_about_its_velocity_is_merged() -> None:
     assert merged(CART, FAR_WHEEL) == [(1, 0)]
     assert merged(CART, FAR_WHEEL, velocity=[(0.8, 0.0, 0.0), (0.41, 0.0, 0.0)]) == [(1, 0)]
     assert merged(CART, replace(FAR_WHEEL, x=0.8)) == []  # beside it
@@ -123,7 +123,7 @@ def test_what_is_seen_through_a_mover_and_goes_much_as_it_does_is_its_own() -> N
     assert merged(CART, FAR_WHEEL, sigma=0.4) == []
 
 
-def test_what_is_low_beside_a_mover_and_goes_much_as_it_does_is_what_it_pushes() -> None:
+def test_low_part_beside_a_mover_with_about_its_velocity_is_merged() -> None:
     pusher = Body(0.0, y=0.1, width=0.4, height=1.6, cells=500)
     trolley = Body(-0.78, y=0.45, width=1.0, height=0.9, cells=400)  # 0.08 m before him, 0.56 of his height
     assert merged(pusher, trolley) == [(1, 0)]
@@ -133,7 +133,7 @@ def test_what_is_low_beside_a_mover_and_goes_much_as_it_does_is_what_it_pushes()
     assert merged(pusher, trolley, sigma=0.4) == []  # not known well enough
 
 
-def test_what_is_tiny_close_to_a_mover_and_goes_exactly_as_it_does_is_its_own() -> None:
+def test_tiny_part_close_to_a_mover_with_its_velocity_is_merged() -> None:
     cart = Body(0.0, z=3.0, width=0.64, height=1.0, depth=0.6, cells=580)
     wheel = Body(-0.42, y=0.3, z=4.0, width=0.1, height=0.2, depth=0.5, cells=58)  # 0.45 m behind it
     assert merged(cart, wheel) == [(1, 0)]

@@ -61,7 +61,7 @@ def test_an_unseen_track_out_of_view_is_not_listed(place: tuple[float, float, fl
     assert len(report.obstacles(tracks(place), now())) == 1
 
 
-def test_what_is_behind_the_camera_is_not_listed_even_if_it_was_just_seen() -> None:
+def test_track_behind_the_camera_is_not_listed_even_if_just_seen() -> None:
     assert report.obstacles(tracks((0.0, 0.0, -0.5)), now()) == ()
 
 
@@ -162,7 +162,7 @@ def test_a_mover_of_which_hardly_anything_is_visible_is_not_listed(unseen_s: flo
         assert len(report.obstacles(made, now())) == listed
 
 
-def test_what_is_seen_and_what_stands_still_keep_the_box_they_were_seen_by() -> None:
+def test_visible_and_static_tracks_keep_the_box_seen_last() -> None:
     for moving, unseen_s in ((True, 0.0), (False, 0.1)):
         made = tracks((0.5, 0.0, 3.0), unseen_s=unseen_s)
         made.moving[:] = moving
@@ -175,7 +175,7 @@ def test_what_is_seen_and_what_stands_still_keep_the_box_they_were_seen_by() -> 
     ("overhead", "moving", "cells", "listed"),
     [(True, False, 99, False), (True, True, 24, True), (True, True, 23, False), (False, False, 6, True)],
 )
-def test_what_is_seen_above_the_robot_only_is_listed_when_much_of_it_moves(
+def test_track_seen_only_above_the_robot_is_listed_if_much_of_it_moves(
     overhead: bool, moving: bool, cells: int, listed: bool
 ) -> None:
     made = tracks(BEFORE_ME)

@@ -10,7 +10,7 @@ from tests.support.detections import detection
 from tests.support.grids import grid_of, labelled, nearest, plate
 from vision.bodies import sightings
 from vision.bodies.tracks import Tracks
-from vision.depth import regions
+from vision.depth import occlusion, regions
 from vision.depth.connected import MIN_PART_CELLS
 
 
@@ -22,7 +22,7 @@ def seen_of(left_m: float, right_m: float, moving: bool = True) -> Tracks:
     for frame, (low, high) in enumerate(((-0.3, 0.3), (left_m, right_m))):
         depth_m = plate(3.0, (low, high), (-0.6, 0.6))
         grid, labels = grid_of(depth_m), labelled(depth_m > 0.0)
-        measured = regions.with_occlusion(grid, labels, regions.measure(grid, labels, 1))
+        measured = occlusion.with_occlusion(grid, labels, regions.measure(grid, labels, 1))
         sightings.update_from_surfaces(tracks, detection(grid, frame), measured, DepthNoise())
     return tracks
 
@@ -37,11 +37,11 @@ def test_a_mover_of_which_less_than_two_fifths_are_left_to_see_is_a_sliver(
     assert (abs(whole_m - 0.6) < 0.1) == nearly_hidden  # a small rest says nothing of how wide its body is
 
 
-def test_what_stands_is_no_sliver() -> None:
+def test_standing_track_is_not_nearly_hidden() -> None:
     assert not seen_of(-0.3, -0.2, moving=False).nearly_hidden.any()
 
 
-def test_who_leaves_the_image_is_no_sliver() -> None:
+def test_mover_that_leaves_the_image_is_not_nearly_hidden() -> None:
     """Its rest is where it is seen to be, and the others are outside."""
     assert not seen_of(-1.6, -1.5).nearly_hidden.any()
 
@@ -55,7 +55,7 @@ def reaching_in(moving: bool) -> float:
         tracks.predict(1.0 / 30.0, 0.12, None)
         depth_m = plate(3.0, (-2.0, -1.2 + 0.04 * frame), (-0.6, 0.6))
         grid, labels = grid_of(depth_m), labelled(depth_m > 0.0)
-        measured = regions.with_occlusion(grid, labels, regions.measure(grid, labels, 1))
+        measured = occlusion.with_occlusion(grid, labels, regions.measure(grid, labels, 1))
         sightings.update_from_surfaces(tracks, detection(grid, frame), measured, DepthNoise())
     return float(tracks.state[0, 3])
 
@@ -74,7 +74,7 @@ def test_an_overlapped_surface_alone_proves_no_motion(board_m: float, whole: boo
         crate, board = plate(3.0, (-0.3, 0.3), (-0.3, 0.3)), plate(board_m, (0.12, 1.0), (-1.0, 1.0))
         depth_m = nearest(crate, board)
         grid, labels = grid_of(depth_m), labelled(depth_m == 3.0)
-        measured = regions.with_occlusion(grid, labels, regions.measure(grid, labels, 1))
+        measured = occlusion.with_occlusion(grid, labels, regions.measure(grid, labels, 1))
         sightings.update_from_surfaces(tracks, detection(grid, frame), measured, DepthNoise())
     assert (tracks.velocity_measured_s[0] > 0.1) == whole
 

@@ -33,7 +33,7 @@ def test_a_leg_of_who_stopped_is_part_of_it() -> None:
     assert not person.moving
 
 
-def test_what_appears_beside_something_that_never_moved_is_another_thing() -> None:
+def test_surface_beside_a_track_that_never_moved_is_another_track() -> None:
     still, other = seen_at_the_end(0.0)
     assert not still.moving
     assert other.extent_m[1] < 0.6

@@ -21,7 +21,7 @@ def test_a_centre_goes_that_has_gone_about_as_fast_as_its_velocity_says(dt_s: fl
     np.testing.assert_array_equal(advances, [True, True, False, False])
 
 
-def test_what_the_trail_knows_goes_with_its_track() -> None:
+def test_trailing_average_follows_its_track() -> None:
     tracks = Tracks()
     tracks.start(np.zeros((2, 3)), 0.1, 1.5, 0.0, 0)
     tracks.state[:, 3] = [0.0, 1.0]
@@ -61,7 +61,7 @@ def test_overdue_is_a_mover_unproven_that_has_gone_most_of_its_width_since() -> 
     assert not tracks.overdue(0.0, sight, resolves_m).any()  # nothing was seen then
 
 
-def test_who_goes_along_the_line_of_sight_is_overdue_once_depth_would_tell() -> None:
+def test_mover_along_the_line_of_sight_is_overdue_once_depth_resolves_it() -> None:
     tracks = movers(3)
     tracks.state[:, 3:] = [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0], [0.0, 0.0, 1.0]]
     tracks.extent_m[2, 2] = 1.1
@@ -71,7 +71,7 @@ def test_who_goes_along_the_line_of_sight_is_overdue_once_depth_would_tell() -> 
     )
 
 
-def test_what_is_hidden_is_known_as_a_sliver_without_cells() -> None:
+def test_hidden_track_is_nearly_hidden_without_cells() -> None:
     tracks = Tracks()
     tracks.start(np.zeros((2, 3)), 0.1, 1.5, 1.0, 0)
     tracks.cells[:] = 100

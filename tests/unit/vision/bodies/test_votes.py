@@ -142,7 +142,7 @@ def test_a_part_that_came_is_the_movers_alone_who_has_a_claim_to_it() -> None:
 
 
 @pytest.mark.parametrize(("cells", "winner"), [(301, 1), (300, 0)])
-def test_what_came_almost_whole_is_that_track_itself(cells: int, winner: int) -> None:
+def test_part_that_arrived_almost_whole_stays_with_its_track(cells: int, winner: int) -> None:
     """Three quarters of it, and more, may have come."""
     sizes = np.array([cells, 100])
     left = votes.drop_static_from_arrived(

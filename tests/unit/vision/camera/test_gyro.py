@@ -93,7 +93,7 @@ def test_only_samples_of_most_of_the_time_stand_for_it(times_ms: range, known: b
         assert turn[0] == pytest.approx(0.1)
 
 
-def test_what_is_not_finite_is_missing() -> None:
+def test_gyro_samples_that_are_not_finite_count_as_missing() -> None:
     memory = GyroMemory()
     memory.add(samples(range(0, 105, 5), lambda t_s: math.nan if 0.02 < t_s < 0.07 else 1.0))
     assert memory.turn_rad(0, 100 * MS) is None

@@ -33,7 +33,7 @@ def seen_without(
     return space, space.blank
 
 
-def test_what_is_right_before_the_lens_leaves_its_bands_blank() -> None:
+def test_surface_right_before_the_lens_leaves_its_bands_blank() -> None:
     space, blank = seen_without(CENTRE, slice(None))
     assert blank[inside(space)].all()
     assert not blank[outside(space)].any()
@@ -64,7 +64,7 @@ def test_a_camera_that_looks_down_tells_it_in_its_fanned_bands() -> None:
     assert not seen_without(middle, slice(VGA.height - 80, None), mount=DOWN)[1].any()
 
 
-def test_what_is_measured_beyond_the_depth_mask_is_data() -> None:
+def test_depth_beyond_the_mask_does_not_leave_bands_blank() -> None:
     frame = frame_of(floor())
     depth = frame.depth.copy()
     depth[:, CENTRE] = 30000

@@ -46,7 +46,7 @@ def test_the_nearer_surface_at_an_edge_and_what_lies_behind() -> None:
     np.testing.assert_allclose(at_middle(depth).near_m, [2.0], rtol=1e-6)
 
 
-def test_what_lies_behind_may_be_beyond_the_limit() -> None:
+def test_far_surface_may_lie_beyond_the_depth_limit() -> None:
     """Else the texture of a distant wall would be that of the tree before it, and the tree would go away."""
     depth = flat(14_000)
     depth[:, :41] = 6000

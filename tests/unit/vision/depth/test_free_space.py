@@ -149,7 +149,7 @@ def test_stairs_down_end_what_is_known() -> None:
     np.testing.assert_allclose(space.known_m, 3.0, atol=0.15)
 
 
-def test_what_hangs_higher_than_the_robot_is_no_obstacle() -> None:
+def test_beam_above_the_robots_height_is_no_obstacle() -> None:
     beam = box(vector(3.0, 0.0, ROBOT_HEIGHT_M + 0.12), vector(0.3, 3.0, 0.4), 10)
     scene = scene_after_a_while(floor() + beam)
     assert np.isinf(scene.free_space.nearest_m).all()
@@ -157,7 +157,7 @@ def test_what_hangs_higher_than_the_robot_is_no_obstacle() -> None:
     assert scene.obstacles == ()
 
 
-def test_what_hangs_within_the_robots_height_is_one() -> None:
+def test_beam_within_the_robots_height_is_an_obstacle() -> None:
     beam = box(vector(3.0, 0.0, ROBOT_HEIGHT_M - 0.2), vector(0.3, 1.0, 0.6), 10)
     scene = scene_after_a_while(floor() + beam)
     ahead = np.abs(scene.free_space.bearing_tan) < 0.12

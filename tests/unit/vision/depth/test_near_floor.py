@@ -87,7 +87,7 @@ def test_a_hole_that_begins_where_the_camera_measures_is_one() -> None:
     assert (space.known_m[np.abs(space.bearing_tan) > 0.4] > 7.0).all()
 
 
-def test_what_has_shown_floor_before_is_a_hole_without_it() -> None:
+def test_missing_near_floor_that_was_seen_before_is_a_hole() -> None:
     whole = seen_by(LOW)
     for gone in (without(whole, 0.3, 0.5), measured_from(0.5)):
         space = spaces(*[whole] * 5, gone)[-1]

@@ -21,7 +21,7 @@ from tests.support.grids import (
     plate,
     wall,
 )
-from vision.depth import connected, regions
+from vision.depth import connected, occlusion, regions
 
 CELL_M = STEP_PX / CAMERA.fx  # of a cell one metre away
 
@@ -127,7 +127,7 @@ def beside(far_m: FloatArray, near_m: FloatArray) -> regions.Regions:
     depth_m = nearest(far_m, near_m)
     labels = labelled((far_m > 0.0) & (depth_m == far_m), near_m > 0.0)
     grid = grid_of(depth_m)
-    return regions.with_occlusion(grid, labels, regions.measure(grid, labels, 2))
+    return occlusion.with_occlusion(grid, labels, regions.measure(grid, labels, 2))
 
 
 @pytest.mark.parametrize("side", [-1.0, 1.0])
@@ -182,7 +182,7 @@ def test_the_end_of_a_row_does_not_hide_the_beginning_of_the_next() -> None:
         np.ones(2, np.bool_),
         np.zeros(2, np.bool_),
     )
-    assert regions.with_occlusion(grid, labels, inside).whole.tolist() == [True, True]
+    assert occlusion.with_occlusion(grid, labels, inside).whole.tolist() == [True, True]
 
 
 def test_parts_are_parted_where_depth_jumps_and_speckles_left_out() -> None:

@@ -12,7 +12,8 @@ from vision.bodies.ends import near_ends
 from vision.bodies.masks import predict, surfaces
 from vision.depth.connected import components, spread_labels
 from vision.depth.depth_grid import DepthGrid
-from vision.depth.regions import measure, with_occlusion
+from vision.depth.occlusion import with_occlusion
+from vision.depth.regions import measure
 
 IDENTITY = Pose(np.eye(3), np.zeros(3))
 SHAPE = (24, 32)
@@ -205,9 +206,7 @@ def test_without_depth_no_cell_is_near() -> None:
 
 
 @pytest.mark.parametrize(("quadratic_per_m", "near"), [(0.0075, True), (0.001, False)])
-def test_what_is_at_the_depth_of_an_end_depends_on_the_noise_of_depth(
-    quadratic_per_m: float, near: bool
-) -> None:
+def test_depth_gate_around_an_end_grows_with_depth_noise(quadratic_per_m: float, near: bool) -> None:
     """0.5 m apart, 4 m ahead: 0.3 m and two sigmas are 0.54 m with the usual noise, 0.33 m with little."""
     grid = grid_of(flat(4.0))
     ends = np.full((1, 2, 2), 42.0, np.float32)

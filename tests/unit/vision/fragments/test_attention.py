@@ -81,7 +81,7 @@ def test_a_body_gets_fragments_of_its_own(frame: RgbdFrame) -> None:
     assert (lengths >= 8.0).all()
 
 
-def test_what_is_at_another_depth_is_not_its_own(frame: RgbdFrame) -> None:
+def test_fragment_at_another_depth_is_not_on_the_body(frame: RgbdFrame) -> None:
     assert look(frame, one_body(depth_m=1.5)) == 0
 
 

@@ -159,7 +159,7 @@ def test_the_covariance_of_one_step_by_hand() -> None:
     )
 
 
-def test_what_nothing_holds_is_known_to_three_and_a_half_pixels() -> None:
+def test_end_without_gradient_has_a_sigma_of_three_and_a_half_pixels() -> None:
     assert covariance([0.0, 0.0, 0.0], sigma_px=1.0) == pytest.approx([13.0, 0.0, 13.0])
     strong = 36.0 / (1e5 - 220.0)
     assert covariance([1e5, 0.0, 0.0]) == pytest.approx([strong + 0.0225, 0.0, 12.0225], rel=1e-4)

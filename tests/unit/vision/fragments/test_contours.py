@@ -66,7 +66,7 @@ def test_the_two_ends_of_a_contour() -> None:
         np.testing.assert_allclose(ordered, [[20.0, 50.0], [52.0, 50.0]], atol=1.0)
 
 
-def test_what_is_too_short_is_gone_from_the_edge_image_too() -> None:
+def test_too_short_contours_are_removed_from_the_edge_image() -> None:
     edges = stroke(60) | stroke(15, row=120)
     remaining = find_contours(edges, 32.0).edges
     np.testing.assert_array_equal(remaining, stroke(60))

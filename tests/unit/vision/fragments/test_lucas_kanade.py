@@ -95,7 +95,7 @@ def test_points_of_a_pyramid_are_in_pixels_of_the_whole_image() -> None:
 
 
 @pytest.mark.parametrize("place", [(-30.0, 90.0), (300.0, 90.0), (120.0, -30.0), (120.0, 220.0)])
-def test_what_is_out_of_the_image_is_not_found(place: tuple[float, float]) -> None:
+def test_point_outside_the_image_is_not_found(place: tuple[float, float]) -> None:
     image, outside, inside = pattern(8), np.array([place], np.float32), np.array([[120.0, 90.0]], np.float32)
     assert search(image, image, outside, inside, 1.0, SIDE)[1].tolist() == [False]
     assert search(image, image, inside, outside, 1.0, SIDE)[1].tolist() == [False]

@@ -83,7 +83,7 @@ def test_a_shift_of_the_whole_image_is_found_where_expectations_were_right_so_fa
 
 
 @pytest.mark.parametrize("left_out", [1, 7, 13])
-def test_what_moves_by_itself_is_found_coarse_to_fine_if_its_expectation_was_wrong(left_out: int) -> None:
+def test_end_with_a_wrong_expectation_is_searched_coarse_to_fine(left_out: int) -> None:
     before, start = pattern(1), points()
     guess, last = start.copy(), np.zeros(len(start), np.float32)
     guess[left_out] -= (9.5, 0.0)
@@ -195,7 +195,7 @@ def test_an_end_may_slide_along_its_edge_but_not_across() -> None:
         ((30.0, 30.0), (float("nan"), 0.0), False),
     ],
 )
-def test_what_comes_back_inside_of_the_image_is_confirmed(
+def test_end_is_confirmed_if_the_backward_search_returns_to_it(
     place: tuple[float, float], miss: tuple[float, float], good: bool
 ) -> None:
     there, off = np.array([place], np.float32), np.array([miss], np.float32)

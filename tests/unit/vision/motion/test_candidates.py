@@ -73,7 +73,7 @@ def test_neighbours_may_be_farther_apart_upwards_and_along_the_view() -> None:
     assert grouped([[0.0, 0.0, 4.0], [0.0, 0.0, 4.71]]) == [0, 1]
 
 
-def test_who_moves_otherwise_is_of_another_group() -> None:
+def test_fragments_with_different_velocities_are_in_different_groups() -> None:
     """By more than 0.5 m/s and two sigmas of both, 0.28, across or upwards."""
     here = [[0.0, 0.0, 4.0], [0.1, 0.0, 4.0]]
     assert grouped(here, [[0.0, 0.0, 0.0], [0.78, 0.0, 9.0]]) == [0, 0]

@@ -28,7 +28,7 @@ def expected(store: FragmentStore, velocity: list[float], motion: Pose = STILL) 
     return result
 
 
-def test_what_stands_before_a_camera_that_stands_stays_where_it_is() -> None:
+def test_static_fragment_is_expected_where_it_was_if_the_camera_stands() -> None:
     np.testing.assert_allclose(expected(one_fragment(), [0.0] * 3), [[320.0, 240.0], [380.0, 190.0]])
 
 
@@ -82,7 +82,7 @@ def told(ids: list[int], moving: list[bool], velocity: list[list[float]]) -> Fra
     )
 
 
-def test_what_is_known_of_fragments_is_found_by_their_ids() -> None:
+def test_known_motion_is_looked_up_by_fragment_id() -> None:
     """Of 4 nothing is known that moves, 2 and 9 are unknown, and of 7 one axis has not been measured."""
     before = told([1, 4, 7], [True, False, True], [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0], [7.0, NAN, 9.0]])
     moving, velocity = known_motion(np.array([1, 2, 4, 7, 9], np.int64), before)

@@ -97,7 +97,7 @@ def test_an_outlier_does_not_widen_a_rigid_body() -> None:
     assert found.agreement[0] == pytest.approx(0.9)
 
 
-def test_what_stands_is_explained() -> None:
+def test_standing_body_does_not_contradict_standing() -> None:
     assert swinging([0.0] * 8).contradicts_static[0] == 0.0
 
 
@@ -130,7 +130,7 @@ def solved(
     return body_velocities(nothing_seen(count), per_end, np.arange(count), count, start, max_speed_mps)
 
 
-def test_what_nothing_measures_is_bounded_not_zero() -> None:
+def test_unmeasured_velocity_has_a_bounded_covariance() -> None:
     nothing = np.zeros((1, 3))
     found = solved(np.zeros((1, 3, 3)), nothing, nothing, np.zeros((1, 2)))
     np.testing.assert_array_equal(found.velocity_mps[0], 0.0)

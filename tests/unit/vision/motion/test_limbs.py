@@ -40,12 +40,12 @@ def test_a_rigid_body_that_stands_has_no_limbs() -> None:
     assert limbs.variance(body(12, 1.0), np.zeros(1))[0] == 0.0
 
 
-def test_what_disagrees_widens_the_velocity() -> None:
+def test_disagreeing_ends_increase_the_velocity_variance() -> None:
     """Half of them: 0.5 m/s, however many, where the others stand."""
     assert limbs.variance(body(12, 0.5, contradicts_static=0.5), np.zeros(1))[0] == pytest.approx(0.25)
 
 
-def test_what_several_limbs_say_is_less_uncertain_than_what_one_says() -> None:
+def test_variance_by_limbs_falls_with_the_number_of_ends() -> None:
     """All deny that they stand and disagree, as when somebody starts to walk: 1 m/s over their root."""
     assert limbs.variance(body(8, 0.0, contradicts_static=1.0), np.zeros(1))[0] == pytest.approx(1.0)
     assert limbs.variance(body(40, 0.0, contradicts_static=1.0), np.zeros(1))[0] == pytest.approx(0.2)

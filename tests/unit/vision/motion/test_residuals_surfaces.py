@@ -59,7 +59,7 @@ def past_px(depth_m: float) -> float:
 
 
 @pytest.mark.parametrize("behind_m", [FAR_M, UNSEEN_M])
-def test_what_goes_as_the_surface_behind_does_tells_nothing_of_the_one_before(behind_m: float) -> None:
+def test_end_that_moves_as_the_far_surface_is_not_usable(behind_m: float) -> None:
     """The texture of a wall beside an outline has the outline's depth."""
     step_px = (past_px(behind_m), 0.0)
     assert not seen(UPRIGHT, step_px, behind_m, 1.0, 0.0).usable.any()
@@ -69,13 +69,13 @@ def test_what_goes_as_the_surface_behind_does_tells_nothing_of_the_one_before(be
 
 
 @pytest.mark.parametrize("behind_m", [FAR_M, UNSEEN_M])
-def test_what_goes_as_neither_surface_does_moves(behind_m: float) -> None:
+def test_end_that_moves_as_neither_surface_contradicts_standing(behind_m: float) -> None:
     motion = seen(LEVEL, (past_px(NEAR_M), 3.0), behind_m, 1.0, 0.0)
     assert motion.usable.all()
     assert (motion.static_chi2 > 8.0).all()
 
 
-def test_what_stands_before_another_surface_stands() -> None:
+def test_static_end_before_a_far_surface_is_static() -> None:
     motion = seen(UPRIGHT, (past_px(NEAR_M), 0.0), FAR_M, 1.0, 0.0)
     assert motion.usable.all()
     assert (motion.static_chi2 < 1.0).all()

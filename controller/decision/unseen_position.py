@@ -1,0 +1,102 @@
+"""Where movers out of view are expected now; how they move is in controller/decision/unseen_motion.py.
+
+controller/decision/out_of_view.py extrapolates its movers, and pushes those that would be seen by now out of
+the view again.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from controller.decision.bodies import Bodies
+from controller.decision.unseen_motion import significant_component
+from controller.decision.view_edges import ViewEdges, beyond_edges
+from hal.types import CameraMount, FloatArray, PlanarPose
+from vision.scene import FreeSpace
+
+# A place this far inside the side edge of the view still counts as outside; of a mover, for each second since
+# it was last seen, this much more.
+EDGE_TOLERANCE_M, EDGE_TOLERANCE_MPS = 0.3, 0.15
+_MIN_AXIS_DISTANCE_M = 0.1  # least distance from the camera's axis of a mover that was not seen to come in
+# A body out of view may have changed its velocity by this much per second.
+_VELOCITY_CHANGE_MPS2 = 0.25
+_ROUNDING = 1e-6
+
+
+def extrapolated(bodies: Bodies, dt_s: float, pose: PlanarPose, mount: CameraMount) -> FloatArray:
+    """(N, 2) the positions dt_s later at constant velocity.
+
+    A mover ahead of the camera that approaches its axis (by more than one standard deviation of the
+    sideways velocity) stays at least _MIN_AXIS_DISTANCE_M on its own side: had it crossed, it would have
+    been seen.
+    """
+    way = bodies.velocity_mps * dt_s
+    forward = np.array([math.cos(pose.heading_rad), math.sin(pose.heading_rad)])
+    leftward = np.array([-forward[1], forward[0]])
+    offset = bodies.xy_m - (pose.x_m, pose.y_m)
+    left = offset @ leftward - mount.left_m
+    side = np.where(left < 0.0, -1.0, 1.0)
+    ahead = offset @ forward - mount.forward_m - bodies.half_view_m > 0.0
+    sigma_mps = np.sqrt(leftward @ bodies.covariance @ leftward)
+    comes = bodies.moving & ahead & (-side * (bodies.velocity_mps @ leftward) > sigma_mps)
+    past_m = np.where(comes, np.maximum(_MIN_AXIS_DISTANCE_M - side * (left + way @ leftward), 0.0), 0.0)
+    xy: FloatArray = bodies.xy_m + way + (side * past_m)[:, None] * leftward
+    return xy
+
+
+def pushed_out_of_view(
+    bodies: Bodies,
+    since_s: FloatArray,
+    pose: PlanarPose,
+    mount: CameraMount,
+    edges: ViewEdges,
+    free: FreeSpace,
+) -> Bodies:
+    """The bodies, with movers whose expected place is seen to be free moved outwards, out of the view.
+
+    They are moved sideways to the edge of the free space, and a velocity towards the axis is replaced by
+    its forward component. A body that approaches (by more than one standard deviation) is not moved
+    until it is late by EDGE_TOLERANCE_M plus EDGE_TOLERANCE_MPS for each second since it was last seen.
+    since_s (N,): for how long each has been out of view.
+    """
+    cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
+    forward, leftward = np.array([cos, sin]), np.array([-sin, cos])
+    offset = bodies.xy_m - (pose.x_m, pose.y_m)
+    ahead, left = offset @ forward - mount.forward_m, offset @ leftward - mount.left_m
+    near, far = ahead - bodies.half_view_m, ahead + bodies.half_view_m
+    within = ~beyond_edges(bodies, near, mount.height_m, edges)
+    side = np.where(left < 0.0, -1.0, 1.0)
+    inner = side * left - bodies.half_across_m
+    xy, velocity = bodies.xy_m.copy(), bodies.velocity_mps.copy()
+    covariance, unseen_s = bodies.covariance.copy(), bodies.unseen_s.copy()
+    for k in np.flatnonzero(bodies.moving & within & (near > 0.0)).tolist():
+        from_tan = float(min(inner[k] / near[k], inner[k] / far[k]))
+        outside_m = _seen_through_tan(free, float(side[k]), from_tan, float(far[k])) * far[k]
+        push_out_m = outside_m - inner[k]
+        inwards_mps = -side[k] * float(velocity[k] @ leftward)
+        comes = -side[k] * significant_component(velocity[k], covariance[k], leftward) > 0.0
+        if push_out_m < (EDGE_TOLERANCE_M + EDGE_TOLERANCE_MPS * unseen_s[k] if comes else -_ROUNDING):
+            continue
+        xy[k] += side[k] * push_out_m * leftward
+        if inwards_mps > 0.0:
+            velocity[k] = significant_component(velocity[k], covariance[k], forward) * forward
+        turned_mps = _VELOCITY_CHANGE_MPS2 * float(since_s[k])
+        np.fill_diagonal(covariance[k], np.maximum(np.diagonal(covariance[k]), turned_mps**2))
+        unseen_s[k] = 0.0
+    return replace(bodies, xy_m=xy, velocity_mps=velocity, covariance=covariance, unseen_s=unseen_s)
+
+
+def _seen_through_tan(free: FreeSpace, side: float, from_tan: float, far_m: float) -> float:
+    """Tangent of the bearing, outwards, up to which all bands from from_tan on are seen free to far_m.
+
+    side: 1 to the left, -1 to the right. -inf if the first band is not seen that far.
+    """
+    outwards = -side * free.bearing_tan
+    order = np.argsort(outwards)
+    order = order[outwards[order] + free.half_width_tan > from_tan - _ROUNDING]
+    closed = np.flatnonzero(~(free.known_m[order] >= far_m))
+    opened = order[: closed[0]] if len(closed) else order
+    return float(outwards[opened[-1]]) + free.half_width_tan if len(opened) else -math.inf
