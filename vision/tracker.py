@@ -178,7 +178,8 @@ class Tracker:
     def _regroup(self, detection: Detection, labels: IntGrid, measured: Regions, changes: Changes) -> IntGrid:
         """Join tracks that are one body and divide those that are two; the same labels if there are none."""
         tracks, grid = self._tracks, detection.grid
-        if not tracks.moving.any():
+        may_be_two = tracks.moving | (tracks.restless_s > 0.0)
+        if not may_be_two.any():
             return labels
         mover = tracks.mover
         pairs = merging.pairs_to_merge(
@@ -187,7 +188,7 @@ class Tracker:
         displacement_m = tracks.speed_mps * changes.stayed_s
         labels, gone = merging.merge_labels(grid, labels, pairs, changes.stayed, displacement_m)
         tracks.seen_ns[gone] = detection.captured_ns - _LONG_AGO_NS
-        for track in (tracks.moving & (measured.cells > 0)).nonzero()[0].tolist():
+        for track in (may_be_two & (measured.cells > 0)).nonzero()[0].tolist():
             second = division.second_body(grid, labels, track, changes.stayed, float(displacement_m[track]))
             if second is not None:
                 tracks.start_from(track, carving.SUSPECT_EVIDENCE, detection.captured_ns)

@@ -96,3 +96,13 @@ def labelled(*masks: NDArray[np.bool_]) -> NDArray[np.int32]:
     for number, mask in enumerate(masks, start=1):
         labels[mask] = number
     return labels
+
+
+def people(apart_m: float, tall_m: tuple[float, float] = (1.7, 1.7), head_m: float = 0.2) -> FloatArray:
+    """Depth of two, 3 m away, whose heads are apart_m from each other; their bodies, 0.45 m wide, touch."""
+    seen = [plate(3.0, (-apart_m / 2, apart_m / 2), (-0.2, 0.8))]
+    for x_m, height_m in zip((-apart_m / 2, apart_m / 2), tall_m, strict=True):
+        top_m = 0.9 - height_m
+        seen.append(plate(3.0, (x_m - head_m / 2, x_m + head_m / 2), (top_m, top_m + 0.3)))
+        seen.append(plate(3.0, (x_m - 0.225, x_m + 0.225), (top_m + 0.3, 0.9)))
+    return nearest(*seen)

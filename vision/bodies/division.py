@@ -1,7 +1,8 @@
 """Division of one track that holds two bodies, such as two people who walk side by side.
 
 It takes the cells of one track and returns those of a second body, if there is one. vision/tracker.py calls
-it for each moving track, after merging (vision/bodies/merging.py). Terms: vision/__init__.py.
+it after merging (vision/bodies/merging.py) for each track that moves, and for each that is restless: a person
+who walks and one who stands, shoulder before shoulder, do not move as one body. Terms: vision/__init__.py.
 """
 
 from __future__ import annotations
@@ -38,6 +39,7 @@ _MIN_HEAD_M = 0.13  # minimum width; the shoulders are wider than the head by th
 _MAX_HEAD_M = 0.30  # maximum width
 _SHOULDERS_M = 0.36  # the width of the shoulders is measured this far below the top
 _MIN_APART_M = 0.35  # minimum distance of two heads
+_PAIR_WIDTH_M = 0.7  # minimum width of two people whose heads are _MIN_APART_M apart
 _MAX_APART_M = 0.8  # maximum distance: people farther apart leave a valley
 # Share of the image between two groups: if less shows something farther, nothing is seen there.
 _NOTHING_SEEN_SHARE = 0.2
@@ -51,8 +53,8 @@ def second_body(
     """Flat cells of labels == track + 1 that belong to a second body, the smaller one; None: it is one body.
 
     The cells are projected onto the line along which they spread most, seen from above. Two people leave a
-    valley in between; a crate, however wide, does not. Where there is no valley, two heads with a dip
-    between them show two people as well. The smaller group is not a second body if
+    valley in between if they are wider than one; a crate, however wide, does not. Where there is no valley,
+    two heads with a dip between them show two people as well. The smaller group is not a second body if
 
     * it is seen through the larger group, as the far wheels of a cart are;
     * it is low beside the larger group and moves with it, as a trolley in front of the person who pushes it.
@@ -66,15 +68,15 @@ def second_body(
     if len(cells) < 2 * _MIN_GROUP:
         return None
     points = grid.points(cells)[::2].T.astype(float)
-    if np.hypot(*(points.max(axis=0) - points.min(axis=0))) < SINGLE_WIDTH_M:
+    if np.hypot(*(points.max(axis=0) - points.min(axis=0))) < _PAIR_WIDTH_M:
         return None  # a quick test that most tracks end at: no line can be longer than this diagonal
     centred = points - median(points.T)
     _, axes = np.linalg.eigh(centred.T @ centred)
     along = centred @ axes[:, 1]
     low, high = quantiles(along, (0.03, 0.97))
-    if high - low < SINGLE_WIDTH_M:
+    if high - low < _PAIR_WIDTH_M:
         return None
-    beyond = _beyond_valley(points, along, low, high)
+    beyond = _beyond_valley(points, along, low, high) if high - low >= SINGLE_WIDTH_M else None
     smaller_group = _second_head(grid, cells) if beyond is None else beyond
     if smaller_group is None:
         return None

@@ -42,6 +42,7 @@ _URGENT_SIGHTINGS = 45  # bodies seen in fewer frames, and suspects, are urgent
 # 15 or 10 Hz, so that the rounding of a stamp does not decide.
 _URGENT_NS = 95_000_000
 _IDLE_NS = 495_000_000  # the same at any other body: it is looked at twice a second
+_REMEMBERED_NS = 2_000_000_000  # a look that was longer ago counts as none
 _MARGIN_PX = 6  # around the box: edges are at the rim of a body, and corners are looked for beside them
 _MIN_SIDE_PX = 16  # of the box: the minimum length of a segment here
 _MIN_LENGTH = 0.5  # minimum length of a segment here, relative to that of other fragments
@@ -262,18 +263,26 @@ class Attention:
         return new_fragments(here.nonzero()[0][:wanted], ends, tensor, surface, self._config.fragments)
 
     def _next(self, bodies: NeedsFragments, now_ns: int) -> int | None:
-        """Index of the body whose turn it is: urgent ones first, of these the one that has waited longest."""
+        """Index of the body whose turn it is.
+
+        Urgent ones come first. Of these it is the one with the largest product of the time that it has waited
+        and the size of its box: there are many slivers of furniture, and little is found on them.
+        """
         # A body that was never looked at has waited since the first call.
         self._began_ns = now_ns if self._began_ns is None else min(self._began_ns, now_ns)
         ids = bodies.ids.tolist()
         if not ids:
             return None
-        self._looked_ns = {one: at for one, at in self._looked_ns.items() if now_ns - at < _IDLE_NS}
-        first, longest = None, (False, -1)
+        self._looked_ns = {
+            one: at for one, at in self._looked_ns.items() if 0 <= now_ns - at < _REMEMBERED_NS
+        }
+        size_px = np.sqrt(np.ptp(bodies.box_px.reshape(-1, 2, 2), axis=1).prod(axis=1)).tolist()
+        first, longest = None, (False, -1.0)
         for index, (number, urgent) in enumerate(zip(ids, bodies.urgent.tolist(), strict=True)):
-            waited_ns = now_ns - self._looked_ns.get(number, self._began_ns)
-            if waited_ns >= (_URGENT_NS if urgent else _IDLE_NS) and (urgent, waited_ns) > longest:
-                first, longest = index, (urgent, waited_ns)
+            waited_ns = min(now_ns - self._looked_ns.get(number, self._began_ns), _REMEMBERED_NS)
+            turn = urgent, waited_ns * size_px[index]
+            if waited_ns >= (_URGENT_NS if urgent else _IDLE_NS) and turn > longest:
+                first, longest = index, turn
         if first is not None:
             self._looked_ns[ids[first]] = now_ns
         return first

@@ -186,21 +186,6 @@ def test_a_suddenly_hidden_mover_keeps_its_whole_box_and_goes_on() -> None:
         np.testing.assert_allclose(mover.bbox_px, edges, atol=8.0)
 
 
-def pair(frame: int, gap_m: float) -> FloatArray:
-    """A grown-up and, gap_m to the right, a child, who walk alike."""
-    x_m = -1.1 + way_m(frame)
-    grown = plate(3.0, (x_m, x_m + 0.5), (-0.9, 1.0))
-    child = plate(3.0, (x_m + 0.5 + gap_m, x_m + 0.9 + gap_m), (-0.3, 1.0))
-    return nearest(grown, child)
-
-
-def test_a_pair_that_would_be_divided_again_is_not_merged() -> None:
-    percepts = track([pair(k, 0.18) for k in range(40)])
-    ids = [tuple(one.id for one in moving(percept)) for percept in percepts[15:]]
-    assert len(ids[0]) == 2
-    assert set(ids) == {ids[0]}  # the same two throughout: neither merged nor born again
-
-
 def holed(frame: int) -> FloatArray:
     """One person in two parts: a row of depth is missing above the shoes."""
     x_m = -0.9 + way_m(frame)

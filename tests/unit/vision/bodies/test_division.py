@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from hal.types import FloatArray
-from tests.support.grids import LEVEL_UP, X, grid_of, labelled, nearest, plate
+from tests.support.grids import LEVEL_UP, X, grid_of, labelled, nearest, people, plate
 from vision.bodies import division
 from vision.bodies.merging import merge_labels
 from vision.depth.depth_grid import BoolGrid, DepthGrid
@@ -146,20 +145,11 @@ def test_between_a_piece_wider_than_anybody_and_another_something_has_to_be_seen
     assert (second_of(grid_of(depth_m), labelled(body > 0.0), 0) is not None) == divided
 
 
-def people(apart_m: float, tall_m: tuple[float, float] = (1.7, 1.7), head_m: float = 0.2) -> FloatArray:
-    """Depth of two, 3 m away, whose heads are apart_m from each other; their bodies, 0.45 m wide, touch."""
-    seen = [plate(3.0, (-apart_m / 2, apart_m / 2), (-0.2, 0.8))]
-    for x_m, height_m in zip((-apart_m / 2, apart_m / 2), tall_m, strict=True):
-        top_m = 0.9 - height_m
-        seen.append(plate(3.0, (x_m - head_m / 2, x_m + head_m / 2), (top_m, top_m + 0.3)))
-        seen.append(plate(3.0, (x_m - 0.225, x_m + 0.225), (top_m + 0.3, 0.9)))
-    return nearest(*seen)
-
-
 @pytest.mark.parametrize(
     ("apart_m", "tall_m", "head_m", "divided"),
     [
         (0.5, (1.7, 1.7), 0.2, True),
+        (0.4, (1.7, 1.7), 0.2, True),  # shoulder before shoulder: together 0.85 m wide
         (0.7, (1.7, 1.5), 0.2, True),
         (0.9, (1.7, 1.7), 0.2, False),  # whose arms do not touch leaves a valley
         (0.5, (1.7, 1.7), 0.45, False),  # two loads, not two heads

@@ -155,21 +155,29 @@ def test_at_the_very_beginning_everybody_waits_as_long(
     assert look(frame, body, attention, pause_s) > 0
 
 
+def both(first: NeedsFragments, second: NeedsFragments, urgent: tuple[bool, bool]) -> NeedsFragments:
+    parts = zip(*((one.ids, one.box_px, one.depth_m, one.gate_m) for one in (first, second)), strict=True)
+    ids, box_px, depth_m, gate_m = (np.concatenate(part) for part in parts)
+    return NeedsFragments(ids, box_px, depth_m, gate_m, np.array(urgent))
+
+
 def test_the_urgent_one_comes_first_then_who_has_waited_for_longest(frame: RgbdFrame) -> None:
     """Only one of them stands where something is to be found: it is seen when its turn comes."""
     here, away = one_body(number=7), one_body(number=9, depth_m=1.5)
-
-    def both(first: NeedsFragments, second: NeedsFragments, urgent: tuple[bool, bool]) -> NeedsFragments:
-        parts = zip(*((one.ids, one.box_px, one.depth_m, one.gate_m) for one in (first, second)), strict=True)
-        ids, box_px, depth_m, gate_m = (np.concatenate(part) for part in parts)
-        return NeedsFragments(ids, box_px, depth_m, gate_m, np.array(urgent))
-
     assert look(frame, both(away, here, (False, True))) > 0
     assert look(frame, both(away, here, (True, False))) == 0
     attention, equal = awake(frame), both(away, here, (True, True))
     assert look(frame, equal, attention) == 0
     assert look(frame, equal, attention, FRAME_S) > 0
     assert look(frame, equal, attention, 2.0 * FRAME_S) == 0  # neither has waited for long
+
+
+def test_of_two_that_have_waited_as_long_the_larger_comes_first(frame: RgbdFrame) -> None:
+    """Whichever comes first in the list; the small one is nowhere near a fragment."""
+    large = one_body(number=7)
+    small = replace(one_body(number=9, depth_m=1.5), box_px=np.array([[281.0, 178.0, 301.0, 220.0]]))
+    assert look(frame, both(small, large, (True, True))) > 0
+    assert look(frame, both(large, small, (True, True))) > 0
 
 
 def tracks(places: list[tuple[float, float, float]]) -> Tracks:
