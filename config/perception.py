@@ -97,10 +97,10 @@ class EgoMotionSettings(Section):
     steady_speed_mps: float = Field(
         default=0.5, gt=0, description="without odometry: change of the velocity between two frames"
     )
-    rolling_speed_mps: float = Field(
-        default=0.15,
+    rolling_accel_mps2: float = Field(
+        default=1.5,
         gt=0,
-        description="the same along the way of a camera on a robot, which changes its speed slowly",
+        description="without odometry: change of the forward speed of a robot, which is slow, in a second",
     )
     unknown_factor: float = Field(
         default=3.0,

@@ -24,7 +24,8 @@ from vision.depth.depth_grid import DepthGrid, make_grid
 from vision.depth.depth_mask import surface_depth
 from vision.detection import MIN_AGREEMENT, MOTION_NOT_KNOWN, Detection, camera_health, no_motion
 from vision.ego_motion.camera_motion import CameraEstimate, estimate
-from vision.ego_motion.motion_prior import MotionPrior, odometry_prior, rolling_prior, steady_prior, with_gyro
+from vision.ego_motion.motion_memory import MotionMemory
+from vision.ego_motion.motion_prior import MotionPrior
 from vision.ego_motion.rolling_shutter import ReadOut
 from vision.fragments import optical_flow
 from vision.fragments.attention import Attention, NeedsFragments
@@ -52,6 +53,7 @@ class Detector:
         self._store = FragmentStore()
         self._renewal = Renewal(config)
         self._attention = Attention(config)
+        self._renewed = True  # the fragments, in the last frame
         self._health = HealthMonitor(config)
         self._last_health = CameraHealth(CameraCondition.GOOD, "", float("nan"))
         self._floor = FloorFinder()
@@ -59,9 +61,7 @@ class Detector:
         self._images: Pyramid = ()
         self._last_ns = 0
         self._pose = _IDENTITY
-        self._odometry: Pose | None = None
-        self._motion = _IDENTITY
-        self._motion_dt_s = 0.0
+        self._memory = MotionMemory(mount, config.ego_motion)
         self._gyro = GyroMemory()
         self._read_out = ReadOut(config.ego_motion.vibration_radps)
         self._variance_scale = 1.0
@@ -108,7 +108,8 @@ class Detector:
     ) -> Detection:
         """Detect in a frame that comes dt_s after the one before it and can be compared with it."""
         config, store = self._config, self._store
-        prior = self._prior(frame, odometry, dt_s)
+        turn_rad = self._gyro.turn_rad(self._last_ns, frame.captured_ns)
+        prior = self._memory.prior(odometry, turn_rad, dt_s)
         images = pyramid(grey, config.fragments)
         excluded = self._track_ends(frame, images, prior, previous, dt_s)
         anchor = store.anchors(frame.captured_ns, config.motion.window_s)
@@ -121,7 +122,7 @@ class Detector:
         self._read_out.learn(found, vector_from_rotation(step.rotation), dt_s)
         self._pose = found.pose
         ego, reckoned = _ego(step, dt_s, found, prior), prior.source != "none"
-        self._motion, self._motion_dt_s = step, dt_s if ego.source != "none" else 0.0
+        self._memory.learn(step, dt_s, ego.source)
         blurred = found.visual and not reckoned and found.inlier_ratio < MIN_AGREEMENT
         detection = self._detection(
             frame,
@@ -133,9 +134,11 @@ class Detector:
             motion_known=ego.source in ("visual", "odometry") and not blurred,
             reckoned=reckoned,
         )
-        self._renew(frame, grey)
-        if previous is not None:
-            self._look_closer(frame, grey, previous.needs_fragments)
+        # A look at a body takes the place of a renewal, but never twice in a row.
+        looked = previous is not None and self._look_closer(frame, grey, previous.needs_fragments)
+        self._renewed = not (looked and self._renewed)
+        if self._renewed:
+            self._renew(frame, grey)
         if ego.source != "visual" or blurred:
             store.break_history()
         self._commit(frame, images, odometry, found.sweep_rad)
@@ -201,20 +204,22 @@ class Detector:
         return grid
 
     def _renew(self, frame: RgbdFrame, grey: GreyImage) -> None:
-        missing = np.isnan(self._store.near_m)
-        without_depth = int(np.count_nonzero(missing[:, 0] & missing[:, 1]))
+        without_depth = int(np.count_nonzero(np.isnan(self._store.near_m).all(axis=1)))
         new = self._renewal.find(frame, grey, self._store.ends_px, without_depth)
         self._store.add(new.ends_px, new.near_m, new.far_m, new.pixel_cov)
 
-    def _look_closer(self, frame: RgbdFrame, grey: GreyImage, bodies: NeedsFragments) -> None:
+    def _look_closer(self, frame: RgbdFrame, grey: GreyImage, bodies: NeedsFragments) -> bool:
         new = self._attention.find(frame, grey, self._store.ends_px, bodies)
-        self._store.add(new.ends_px, new.near_m, new.far_m, new.pixel_cov, body_only=True)
+        if new is not None:
+            self._store.add(new.ends_px, new.near_m, new.far_m, new.pixel_cov, body_only=True)
+        return new is not None
 
     def _commit(
         self, frame: RgbdFrame, images: Pyramid, odometry: Pose | None, sweep_rad: FloatArray
     ) -> None:
         self._store.commit(frame.captured_ns, self._pose, frame.intrinsics, sweep_rad)
-        self._images, self._last_ns, self._odometry = images, frame.captured_ns, odometry
+        self._images, self._last_ns = images, frame.captured_ns
+        self._memory.note_odometry(odometry)
         self._gyro.forget(frame.captured_ns)
 
     def _restart(
@@ -228,7 +233,7 @@ class Detector:
         """Begin anew: at the first frame, after a gap or a step back of time, or with another image size."""
         self._store.clear()
         self._read_out.forget_last()
-        self._motion, self._motion_dt_s = _IDENTITY, 0.0
+        self._memory.forget()
         self._renew(frame, grey)
         motion = no_motion(2 * len(self._store))
         detection = self._detection(frame, grid, health, motion, restarted=True)
@@ -272,17 +277,6 @@ class Detector:
             motion_known=motion_known,
             reckoned=reckoned,
         )
-
-    def _prior(self, frame: RgbdFrame, odometry: Pose | None, dt_s: float) -> MotionPrior:
-        settings = self._config.ego_motion
-        if odometry is not None and self._odometry is not None:
-            prior = odometry_prior(self._odometry.inverse() @ odometry, dt_s, settings)
-        elif self._mount is not None:
-            prior = rolling_prior(self._motion, self._motion_dt_s, dt_s, self._mount, settings)
-        else:
-            prior = steady_prior(self._motion, self._motion_dt_s, dt_s, settings)
-        turn_rad = self._gyro.turn_rad(self._last_ns, frame.captured_ns)
-        return prior if turn_rad is None else with_gyro(prior, turn_rad, dt_s, settings)
 
 
 def _ego(step: Pose, dt_s: float, result: CameraEstimate, prior: MotionPrior) -> EgoMotion:

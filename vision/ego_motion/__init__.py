@@ -2,6 +2,8 @@
 
 Files, in the order in which they come into play:
 
+* motion_memory - what the frames before tell of the motion; chooses the prior.
+* forward_speed - the robot's speed without odometry, filtered over the frames.
 * motion_prior - the prior of the motion, from odometry, a gyro, or the motion before.
 * reprojection - anchored points, and where they are seen now.
 * pose_arrays - poses as arrays, moved and compared in compiled steps.

@@ -20,6 +20,7 @@ import numpy as np
 from config.perception import EgoMotionSettings
 from hal.types import CameraMount, FloatArray, Pose
 from vision.camera.lens import rotation_from_vector, vector_from_rotation
+from vision.ego_motion.forward_speed import ForwardSpeed, ahead, down
 
 _SIDEWAYS_MPS = 0.10  # one sigma across the direction of travel: vibration, and slip while turning
 
@@ -77,36 +78,33 @@ def steady_prior(last: Pose, last_dt_s: float, dt_s: float, settings: EgoMotionS
 
 
 def rolling_prior(
-    last: Pose, last_dt_s: float, dt_s: float, mount: CameraMount, settings: EgoMotionSettings
+    turn_radps: float | None,
+    speed: ForwardSpeed,
+    dt_s: float,
+    mount: CameraMount,
+    settings: EgoMotionSettings,
 ) -> MotionPrior:
     """A prior without odometry: the robot keeps its forward speed and its rate of turn.
 
     Sideways the camera moves only as a turn swings it around the turning centre, and it tilts only by
     vibration. Therefore something that crosses the view is not taken for the robot's own motion. Nor is
     something that moves ahead of the robot at its own speed, since a tracked robot changes its speed slowly.
-    last, last_dt_s: the last motion and its duration; last_dt_s is 0 if it is not known.
+    turn_radps: rate of turn in the frame before, None if it is not known. speed: of the robot then.
     """
-    known = last_dt_s > 0
-    share = dt_s / last_dt_s if known else 0.0
-    ahead = np.array([0.0, -math.sin(mount.pitch_rad), math.cos(mount.pitch_rad)])
-    down = np.array([0.0, math.cos(mount.pitch_rad), math.sin(mount.pitch_rad)])
-    turn_rad = share * float(vector_from_rotation(last.rotation) @ down)
-    displacement_m = share * float(last.translation_m @ ahead)
-    motion = Pose(
-        rotation_from_vector(turn_rad * down), displacement_m * ahead + [mount.forward_m * turn_rad, 0.0, 0.0]
-    )
-    factor = 1.0 if known else settings.unknown_factor
-    turn = settings.steady_rotation_radps * factor
-    speed = settings.rolling_speed_mps if known else settings.steady_speed_mps * factor
-    swing = abs(mount.forward_m) * turn
+    turn_rad = 0.0 if turn_radps is None else turn_radps * dt_s
+    swing_m = np.array([mount.forward_m * turn_rad, 0.0, 0.0])
+    motion = Pose(rotation_from_vector(turn_rad * down(mount)), speed.mps * dt_s * ahead(mount) + swing_m)
+    factor = settings.unknown_factor
+    sigma_radps = settings.steady_rotation_radps * (factor if turn_radps is None else 1.0)
+    sigma_mps = min(speed.later_sigma_mps(dt_s, settings), settings.steady_speed_mps * factor)
     sigma = np.array(
         [
             settings.vibration_radps,
-            turn,
+            sigma_radps,
             settings.vibration_radps,
-            math.hypot(_SIDEWAYS_MPS, swing),
-            math.hypot(_SIDEWAYS_MPS, speed * math.sin(mount.pitch_rad)),
-            speed,
+            math.hypot(_SIDEWAYS_MPS, mount.forward_m * sigma_radps),
+            math.hypot(_SIDEWAYS_MPS, sigma_mps * math.sin(mount.pitch_rad)),
+            sigma_mps,
         ]
     )
     return MotionPrior(motion, sigma * dt_s, "none", True)

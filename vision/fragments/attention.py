@@ -22,7 +22,6 @@ from vision.depth.depth_mask import surface_depth
 from vision.depth.depth_noise import depth_sigma_of
 from vision.detection import Detection
 from vision.fragments.candidates import (
-    NOTHING_NEW,
     NewFragments,
     depth_along,
     joined,
@@ -194,14 +193,17 @@ class Attention:
 
     def find(
         self, frame: RgbdFrame, grey: GreyImage, ends_px: NDArray[np.float32], bodies: NeedsFragments
-    ) -> NewFragments:
-        """New fragments on the body whose turn it is, away from the present ones, ends_px (K, 2, 2)."""
+    ) -> NewFragments | None:
+        """New fragments on the body whose turn it is, away from the present ones, ends_px (K, 2, 2).
+
+        None: there is no room, or it is the turn of none that is large enough in the image.
+        """
         settings = self._config.fragments
         room = settings.max_fragments + settings.closer_fragments - len(ends_px)
         one = self._next(bodies, frame.captured_ns) if room > 0 else None
         body = None if one is None else _around(grey, bodies, one)
         if body is None:
-            return NOTHING_NEW
+            return None
         wanted = min(room, _AT_ONCE)
         new = self._by_edges(frame, grey, ends_px, body, wanted)
         wanted -= len(new.ends_px)

@@ -12,6 +12,7 @@ from hal.types import CameraMount, FloatArray, Intrinsics, Pose
 from tests.support.point_motion import project
 from vision.camera.lens import rays, rotation_from_vector, vector_from_rotation
 from vision.ego_motion.camera_motion import estimate
+from vision.ego_motion.forward_speed import UNKNOWN_SPEED, ForwardSpeed
 from vision.ego_motion.motion_prior import (
     MotionPrior,
     SweepPrior,
@@ -35,9 +36,8 @@ def motion(turn: tuple[float, float, float], way: tuple[float, float, float]) ->
 
 
 def test_the_robot_goes_on_ahead_and_turns_as_it_did() -> None:
-    last = motion((0.01, 0.02, -0.01), (0.03, 0.01, 0.05))
-    prior = rolling_prior(last, 0.1, 0.2, LEVEL, SETTINGS)
-    # The tilt was vibration. Across its way the camera only swings around the turning centre, 0.3 m behind.
+    prior = rolling_prior(0.2, ForwardSpeed(0.5, 0.1), 0.2, LEVEL, SETTINGS)
+    # Across its way the camera only swings around the turning centre, 0.3 m behind.
     np.testing.assert_allclose(vector_from_rotation(prior.motion.rotation), [0.0, 0.04, 0.0], atol=1e-12)
     np.testing.assert_allclose(prior.motion.translation_m, [0.3 * 0.04, 0.0, 0.1], atol=1e-12)
     assert prior.source == "none"
@@ -45,20 +45,19 @@ def test_the_robot_goes_on_ahead_and_turns_as_it_did() -> None:
 
 def test_a_camera_that_looks_down_goes_along_the_floor() -> None:
     tilted = CameraMount(0.3, 0.0, 0.5, math.radians(30.0))
-    last = motion((0.0, 0.0, 0.0), (0.0, -0.05, 0.05 * math.sqrt(3.0)))
-    prior = rolling_prior(last, DT_S, DT_S, tilted, SETTINGS)
-    np.testing.assert_allclose(prior.motion.translation_m, last.translation_m, atol=1e-12)
-    turned = rolling_prior(motion((0.0, 0.02, 0.0), (0.0, 0.0, 0.0)), DT_S, DT_S, tilted, SETTINGS)
-    turn = 0.02 * math.cos(math.radians(30.0))  # the part about the floor's normal
-    expected = turn * np.array([0.0, math.cos(math.radians(30.0)), 0.5])
+    prior = rolling_prior(0.0, ForwardSpeed(0.1 / DT_S, 0.1), DT_S, tilted, SETTINGS)
+    np.testing.assert_allclose(prior.motion.translation_m, [0.0, -0.05, 0.05 * math.sqrt(3.0)], atol=1e-12)
+    turned = rolling_prior(0.6, ForwardSpeed(0.0, 0.1), DT_S, tilted, SETTINGS)
+    expected = 0.02 * np.array([0.0, math.cos(math.radians(30.0)), 0.5])
     np.testing.assert_allclose(vector_from_rotation(turned.motion.rotation), expected, atol=1e-12)
 
 
 def test_sigma_per_axis() -> None:
-    known = rolling_prior(IDENTITY, DT_S, DT_S, LEVEL, SETTINGS).sigma / DT_S
-    np.testing.assert_allclose(known, [0.25, 0.6, 0.25, math.hypot(0.1, 0.3 * 0.6), 0.1, 0.15])
+    known = rolling_prior(0.0, ForwardSpeed(0.0, 0.12), DT_S, LEVEL, SETTINGS).sigma / DT_S
+    # 0.12 m/s as it was, and 1.5 m/s^2 for 1/30 s.
+    np.testing.assert_allclose(known, [0.25, 0.6, 0.25, math.hypot(0.1, 0.3 * 0.6), 0.1, 0.13])
     # Where not even the motion before is known, speed and turn are wider; what robots cannot do is not.
-    first = rolling_prior(motion((0.0, 0.1, 0.0), (0.0, 0.0, 1.0)), 0.0, DT_S, LEVEL, SETTINGS)
+    first = rolling_prior(None, UNKNOWN_SPEED, DT_S, LEVEL, SETTINGS)
     np.testing.assert_array_equal(first.motion.rotation, np.eye(3))
     np.testing.assert_array_equal(first.motion.translation_m, 0.0)
     np.testing.assert_allclose(first.sigma / DT_S, [0.25, 1.8, 0.25, math.hypot(0.1, 0.3 * 1.8), 0.1, 1.5])
@@ -83,7 +82,7 @@ def seen_mps(prior: MotionPrior, ahead_mps: float, crowd_mps: tuple[float, float
 
 def test_a_crowd_that_crosses_does_not_pass_for_the_robots_own_motion() -> None:
     last = motion((0.0, 0.0, 0.0), (0.0, 0.0, 0.5 * DT_S))
-    rolling = rolling_prior(last, DT_S, DT_S, CameraMount(0.0, 0.0, 0.5, 0.0), SETTINGS)
+    rolling = rolling_prior(0.0, ForwardSpeed(0.5, 0.1), DT_S, CameraMount(0.0, 0.0, 0.5, 0.0), SETTINGS)
     by_hand = steady_prior(last, DT_S, DT_S, SETTINGS)
     assert seen_mps(rolling, 0.5, (0.7, 0.0))[0] == pytest.approx(0.0, abs=0.1)
     # A camera carried by hand may well have gone to the left: then the majority decides.
@@ -94,7 +93,7 @@ def test_a_crowd_that_crosses_does_not_pass_for_the_robots_own_motion() -> None:
 def test_nor_does_a_crowd_that_goes_ahead_at_its_pace(before_mps: float) -> None:
     """Beside which it seems to stand; a frame ago it went before_mps, and may have gathered speed since."""
     last = motion((0.0, 0.0, 0.0), (0.0, 0.0, before_mps * DT_S))
-    rolling = rolling_prior(last, DT_S, DT_S, LEVEL, SETTINGS)
+    rolling = rolling_prior(0.0, ForwardSpeed(before_mps, 0.1), DT_S, LEVEL, SETTINGS)
     by_hand = steady_prior(last, DT_S, DT_S, SETTINGS)
     assert seen_mps(rolling, 0.8, (0.0, 0.8))[2] == pytest.approx(0.8, abs=0.1)
     assert seen_mps(by_hand, 0.8, (0.0, 0.8))[2] == pytest.approx(0.0, abs=0.1)
