@@ -30,9 +30,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.decision.bodies import Bodies, no_bodies
+from controller.decision.leftover_strips import leftover_strips
 from controller.decision.seen_through import SeenThrough, unproven
 from controller.decision.unseen_motion import (
-    MIN_MOVER_HALF_WIDTH_M,
     MIN_TRACKED_S,
     may_enter_way,
     significant_component,
@@ -62,7 +62,6 @@ _MIN_AXIS_DISTANCE_M = 0.1  # least distance from the camera's axis of a mover t
 # A body out of view may have changed its velocity by this much per second.
 _VELOCITY_CHANGE_MPS2 = 0.25
 _ROUNDING = 1e-6
-_STRIP_REACH_M = 0.5  # a strip this near to a kept mover may be a part of it
 
 
 class OutOfView:
@@ -175,7 +174,7 @@ class OutOfView:
         kept_s = np.where(may_enter_way(bodies, pose), _MAY_ENTER_KEPT_S, _MOVING_KEPT_S)
         timely = ~bodies.moving | (since_s <= kept_s)
         kept = _still_kept(out & timely, part_of, bodies.ids, seen.ids)
-        return kept & ~_leftover_strips(bodies, kept)
+        return kept & ~leftover_strips(bodies, kept)
 
     def _extrapolated(self, bodies: Bodies, dt_s: float, pose: PlanarPose) -> FloatArray:
         """(N, 2) the positions dt_s later at constant velocity.
@@ -251,21 +250,6 @@ def _seen_through_tan(free: FreeSpace, side: float, from_tan: float, far_m: floa
     closed = np.flatnonzero(~(free.known_m[order] >= far_m))
     opened = order[: closed[0]] if len(closed) else order
     return float(outwards[opened[-1]]) + free.half_width_tan if len(opened) else -math.inf
-
-
-def _leftover_strips(bodies: Bodies, kept: BoolArray) -> BoolArray:
-    """(N,) narrow strips that were seen to move only briefly, beside a kept mover they may be a part of.
-
-    That mover was seen for longer, and the velocities agree.
-    """
-    older = kept & bodies.moving & (bodies.tracked_s > MIN_TRACKED_S)
-    narrow = bodies.half_across_m < MIN_MOVER_HALF_WIDTH_M
-    strips = bodies.moving & narrow & (bodies.tracked_s <= MIN_TRACKED_S)
-    if not (older.any() and strips.any()):
-        return np.zeros(len(bodies), np.bool_)
-    others = bodies.select(older)
-    beside = others.covers(bodies.xy_m, bodies.half_view_m, _STRIP_REACH_M) & velocities_agree(bodies, others)
-    return np.asarray(strips & beside.any(axis=1))
 
 
 @compiled("int64[:], int64[:]")

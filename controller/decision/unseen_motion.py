@@ -88,16 +88,17 @@ def with_measured_velocity(bodies: Bodies, mistaken_mps: float) -> Bodies:
     _SURE_MOVE_SIGMAS and _APPROACH_MIN_MPS. A speed above mistaken_mps is an error of measurement and is not
     used.
     """
-    squared = np.einsum("ni,ni->n", bodies.measured_mps, bodies.measured_mps)
-    # The variance of the speed along the velocity's own direction is v' C v / v'v; this is v' C v.
-    variance = np.einsum("ni,nij,nj->n", bodies.measured_mps, bodies.covariance, bodies.measured_mps)
-    goes = ~bodies.moving & (bodies.tracked_s >= MIN_TRACKED_S) & (bodies.tracked_s < _VERDICT_TRUSTED_S)
-    goes &= (squared**2 > _SURE_MOVE_SIGMAS**2 * variance) & (squared > _APPROACH_MIN_MPS**2)
-    goes &= squared <= mistaken_mps**2
+    goes = _before_verdict(bodies) & _faster_than(bodies, _SURE_MOVE_SIGMAS)
+    goes &= np.hypot(bodies.measured_mps[:, 0], bodies.measured_mps[:, 1]) <= mistaken_mps
     if not goes.any():
         return bodies
     velocity = np.where(goes[:, None], bodies.measured_mps, bodies.velocity_mps)
     return replace(bodies, velocity_mps=velocity, moving=bodies.moving | goes)
+
+
+def hardly_stood(bodies: Bodies) -> BoolArray:
+    """(N,) which bodies were judged standing before a verdict can be trusted, and measured as moving."""
+    return _before_verdict(bodies) & _faster_than(bodies, _APPROACH_MIN_SIGMAS)
 
 
 def velocities_agree(bodies: Bodies, seen: Bodies) -> BoolArray:
@@ -111,6 +112,20 @@ def velocities_agree(bodies: Bodies, seen: Bodies) -> BoolArray:
     differs = bodies.velocity_mps[:, None] - seen.measured_mps
     same = np.all(differs**2 <= _SAME_VELOCITY_SIGMAS**2 * (spread + seen_spread), axis=2)
     return np.asarray(same & (seen.tracked_s > MIN_TRACKED_S))
+
+
+def _before_verdict(bodies: Bodies) -> BoolArray:
+    """(N,) which bodies are judged standing, but were tracked for MIN_TRACKED_S to _VERDICT_TRUSTED_S only."""
+    told = (bodies.tracked_s >= MIN_TRACKED_S) & (bodies.tracked_s < _VERDICT_TRUSTED_S)
+    return np.asarray(~bodies.moving & told)
+
+
+def _faster_than(bodies: Bodies, sigmas: float) -> BoolArray:
+    """(N,) whose measured speed is above this many standard deviations, and above _APPROACH_MIN_MPS."""
+    squared = np.einsum("ni,ni->n", bodies.measured_mps, bodies.measured_mps)
+    # The variance of the speed along the velocity's own direction is v' C v / v'v; this is v' C v.
+    variance = np.einsum("ni,nij,nj->n", bodies.measured_mps, bodies.covariance, bodies.measured_mps)
+    return np.asarray((squared**2 > sigmas**2 * variance) & (squared > _APPROACH_MIN_MPS**2))
 
 
 @compiled(
