@@ -59,6 +59,9 @@ _MOVING_KEPT_S, _MAY_ENTER_KEPT_S = 2.0, 6.0
 # it was last seen, this much more.
 _EDGE_TOLERANCE_M, _EDGE_TOLERANCE_MPS = 0.3, 0.15
 _MIN_AXIS_DISTANCE_M = 0.1  # least distance from the camera's axis of a mover that was not seen to come in
+# A body that approached up to this time before it was last seen has set off: one more measurement, of what
+# the edge of the view leaves of it, does not prove the opposite.
+_LATELY_NS = 200_000_000
 # A body out of view may have changed its velocity by this much per second.
 _VELOCITY_CHANGE_MPS2 = 0.25
 _ROUNDING = 1e-6
@@ -76,36 +79,33 @@ class OutOfView:
         self._seen_through = SeenThrough(mount)
         self._bodies = no_bodies(0)
         self._since_s: FloatArray = np.zeros(0)
-        # Of bodies that are judged standing but clearly approached: by id, the velocity measured last.
-        self._approach_velocity: dict[int, FloatArray] = {}
+        # Of bodies that are judged standing but clearly approached: by id, when last, and how fast.
+        self._approached: dict[int, tuple[int, FloatArray]] = {}
         self._widest_of, self._widest_half_m = np.zeros(0, np.int64), np.zeros(0)
 
     def mark_leaving_movers(self, seen: Bodies, pose: PlanarPose, edges: ViewEdges) -> Bodies:
         """The seen bodies, of which some that are judged standing are made moving.
 
-        These are the ones that approached the robot's axis when last seen, which perception now only predicts
-        (unseen_s > 0), and whose place is out of view. They get the velocity measured last, and set off.
+        These are the ones that approached the robot's axis when last seen or just before, which perception
+        now only predicts (unseen_s > 0), and whose place is out of view. They set off with that velocity.
         """
         if not len(seen):
-            self._widest_of, self._approach_velocity = seen.ids, {}
+            self._widest_of, self._approached = seen.ids, {}
             return seen
         # The edge of the view cuts bodies off, so the present width says little.
         self._widest_half_m = _widest(seen.ids, seen.half_across_m, self._widest_of, self._widest_half_m)
         self._widest_of = seen.ids
         out, comes = unseen_or_approaching(seen, self._widest_half_m, pose)
-        if not self._approach_velocity and not np.count_nonzero(comes):
+        if not self._approached and not np.count_nonzero(comes):
             return seen
-        ids, before = seen.ids.tolist(), self._approach_velocity
-        self._approach_velocity = {ids[k]: seen.measured_mps[k] for k in np.flatnonzero(comes).tolist()}
-        self._approach_velocity |= {
-            ids[k]: before[ids[k]] for k in np.flatnonzero(out).tolist() if ids[k] in before
-        }
-        came = np.array([one in self._approach_velocity for one in ids], np.bool_)
+        self._approached = self._lately_approached(seen, out, comes)
+        ids = seen.ids.tolist()
+        came = np.array([one in self._approached for one in ids], np.bool_)
         leaves = out & came & self._outside_view(seen, pose, edges)
         if not leaves.any():
             return seen
         velocity = seen.velocity_mps.copy()
-        velocity[leaves] = [self._approach_velocity[ids[k]] for k in np.flatnonzero(leaves).tolist()]
+        velocity[leaves] = [self._approached[ids[k]][1] for k in np.flatnonzero(leaves).tolist()]
         innovation = np.where(leaves[:, None], missing_to_walking(velocity), seen.innovation_mps)
         moving = seen.moving | leaves
         return replace(seen, velocity_mps=velocity, innovation_mps=innovation, moving=moving)
@@ -144,6 +144,22 @@ class OutOfView:
         self._since_s = since_s
         self._bodies = self._pushed_out_of_view(bodies, pose, edges, free) if some_move else bodies
         return self._bodies
+
+    def _lately_approached(
+        self, seen: Bodies, out: BoolArray, comes: BoolArray
+    ) -> dict[int, tuple[int, FloatArray]]:
+        """Which of the bodies judged standing approached when they were last seen, or shortly before.
+
+        out, comes: of unseen_or_approaching.
+        """
+        now_ns, lately = seen.captured_ns, {}
+        for k, track_id in enumerate(seen.ids.tolist()):
+            before = self._approached.get(track_id)
+            if comes[k]:
+                lately[track_id] = now_ns, seen.measured_mps[k]
+            elif before is not None and (out[k] or (not seen.moving[k] and now_ns - before[0] <= _LATELY_NS)):
+                lately[track_id] = before
+        return lately
 
     def _with_missing(
         self, before: Bodies, seen: Bodies, dt_s: float, standing: bool

@@ -22,6 +22,9 @@ MIN_TRACKED_S = 0.5
 # A body that is judged standing counts as approaching if it is faster than both thresholds. Noise makes
 # standing things beside the view seem to creep now and then; lower thresholds would slow the robot each time.
 _APPROACH_MIN_SIGMAS, _APPROACH_MIN_MPS = 3.3, 0.2
+# Lower thresholds for what is as tall as a person: few racks and crates are, so noise slows the robot rarely.
+_PERSON_MIN_SIGMAS, _PERSON_MIN_MPS = 2.5, 0.15
+_PERSON_FROM_M, _PERSON_TO_M = 1.2, 2.2
 # No person or vehicle is as narrow as this, but ends of racks are. Half of the greatest width that was seen.
 MIN_MOVER_HALF_WIDTH_M = 0.1
 # A speed above this many standard deviations is certain: the body will not be found where it was last seen.
@@ -41,14 +44,16 @@ def unseen_or_approaching(
     """Two masks (N,) of the bodies judged standing: not seen in this scene; and seen, but approaching.
 
     Approaching: the measured velocity towards the axis of a robot at pose (the line straight ahead) exceeds
-    the noise. A body is in neither mask if it was tracked for MIN_TRACKED_S or less, or was never wider than
-    MIN_MOVER_HALF_WIDTH_M. widest_half_m (N,): half of the greatest width that each was seen with.
+    the noise; of a body as tall as a person, less suffices. A body is in neither mask if it was tracked for
+    MIN_TRACKED_S or less, or was never wider than MIN_MOVER_HALF_WIDTH_M. widest_half_m (N,): half of the
+    greatest width that each was seen with.
     """
     out, comes = _unseen_or_approaching(
         bodies.moving,
         bodies.tracked_s,
         bodies.unseen_s,
         widest_half_m,
+        bodies.top_m,
         bodies.xy_m,
         bodies.measured_mps,
         bodies.covariance,
@@ -115,7 +120,7 @@ def velocities_agree(bodies: Bodies, seen: Bodies) -> BoolArray:
 
 
 def _before_verdict(bodies: Bodies) -> BoolArray:
-    """(N,) which bodies are judged standing, but were tracked for MIN_TRACKED_S to _VERDICT_TRUSTED_S only."""
+    """(N,) which bodies are judged standing, tracked for MIN_TRACKED_S to _VERDICT_TRUSTED_S only."""
     told = (bodies.tracked_s >= MIN_TRACKED_S) & (bodies.tracked_s < _VERDICT_TRUSTED_S)
     return np.asarray(~bodies.moving & told)
 
@@ -129,14 +134,15 @@ def _faster_than(bodies: Bodies, sigmas: float) -> BoolArray:
 
 
 @compiled(
-    "boolean[:], float64[:], float64[:], float64[:], float64[:, :], float64[:, :], float64[:, :, :],"
-    "float64, float64, float64"
+    "boolean[:], float64[:], float64[:], float64[:], float64[:], float64[:, :], float64[:, :],"
+    "float64[:, :, :], float64, float64, float64"
 )
 def _unseen_or_approaching(
     moving: BoolArray,
     tracked_s: FloatArray,
     unseen_s: FloatArray,
     widest_half_m: FloatArray,
+    top_m: FloatArray,
     xy_m: FloatArray,
     measured_mps: FloatArray,
     covariance: FloatArray,
@@ -157,6 +163,9 @@ def _unseen_or_approaching(
         left_mps = measured_mps[k, 1] * cos - measured_mps[k, 0] * sin
         spread = covariance[k]
         variance = (spread[0, 0] * sin - (spread[0, 1] + spread[1, 0]) * cos) * sin + spread[1, 1] * cos * cos
-        clear_mps = max(_APPROACH_MIN_SIGMAS * math.sqrt(variance), _APPROACH_MIN_MPS)
+        sigmas, least_mps = _APPROACH_MIN_SIGMAS, _APPROACH_MIN_MPS
+        if _PERSON_FROM_M <= top_m[k] <= _PERSON_TO_M:
+            sigmas, least_mps = _PERSON_MIN_SIGMAS, _PERSON_MIN_MPS
+        clear_mps = max(sigmas * math.sqrt(variance), least_mps)
         comes[k] = not out[k] and -np.sign(left_m) * left_mps > clear_mps
     return answers
