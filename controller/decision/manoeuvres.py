@@ -29,6 +29,7 @@ class Manoeuvres:
 
     since_s: time before now for which their motion is uncertain, too.
     spread_along_mps, spread_left_mps: uncertainty of their velocities, along the path and across it.
+    surprise_along_mps, surprise_left_mps: by how much they may already be faster, signed.
     speed_mps: measured speed.
     change_along_mps2, change_left_mps2: greatest change of their velocities.
     uncertain_along_m, uncertain_left_m: uncertainty of their positions.
@@ -37,6 +38,8 @@ class Manoeuvres:
     since_s: FloatArray
     spread_along_mps: FloatArray
     spread_left_mps: FloatArray
+    surprise_along_mps: FloatArray
+    surprise_left_mps: FloatArray
     speed_mps: FloatArray
     change_along_mps2: FloatArray
     change_left_mps2: FloatArray
@@ -95,9 +98,10 @@ def _manoeuvres(
     along_to_side_ratio: float,
     unseen_error_sigmas: float,
 ) -> FloatArray:
-    """(8, N) the fields of Manoeuvres."""
-    answers = np.zeros((8, len(along_mps)))
-    since, spread_along, spread_left, speed, along, sideways, uncertain_along, uncertain_left = answers
+    """(10, N) the fields of Manoeuvres."""
+    answers = np.zeros((10, len(along_mps)))
+    since, spread_along, spread_left, surprise_along, surprise_left = answers[:5]
+    speed, along, sideways, uncertain_along, uncertain_left = answers[5:]
     for k in range(len(along_mps)):
         # unaware: goes in the robot's direction, so it does not see the robot coming and is beside it for
         # long. comes: comes towards the robot, sees it after a while and keeps its lane. leaves: moves away
@@ -116,8 +120,8 @@ def _manoeuvres(
                 sideways[k] = oncoming_mps2
         since[k] = since_s + (0.0 if comes or leaves else unseen_s[k])
         speed[k] = math.hypot(along_mps[k], left_mps[k])
-        spread_along[k] = max(sigmas * sigma_along_mps[k], abs(innovation_along_mps[k]))
-        spread_left[k] = max(sigmas * sigma_left_mps[k], abs(innovation_left_mps[k]))
+        spread_along[k], spread_left[k] = sigmas * sigma_along_mps[k], sigmas * sigma_left_mps[k]
+        surprise_along[k], surprise_left[k] = innovation_along_mps[k], innovation_left_mps[k]
         if not leaves:
             uncertain_along[k] = unseen_error_sigmas * unseen_s[k] * sigma_along_mps[k]
             uncertain_left[k] = unseen_error_sigmas * unseen_s[k] * sigma_left_mps[k]

@@ -59,6 +59,7 @@ def reach(
     """
     return Reach(
         *_grown(
+            placed.d_m,
             placed.clearance_m,
             placed.block_from_s_m,
             placed.block_to_s_m,
@@ -66,6 +67,8 @@ def reach(
             manoeuvres.since_s,
             manoeuvres.spread_along_mps,
             manoeuvres.spread_left_mps,
+            manoeuvres.surprise_along_mps,
+            manoeuvres.surprise_left_mps,
             manoeuvres.speed_mps,
             manoeuvres.change_along_mps2,
             manoeuvres.change_left_mps2,
@@ -121,10 +124,12 @@ def passes_clear(ramp: SpeedRamps, s_m: float, times_s: FloatArray, reached: Rea
 
 
 @compiled(
-    "float64[:, :], float64[:, :], float64[:, :], float64[:], float64[:], float64[:], float64[:], float64[:],"
-    "float64[:], float64[:], float64[:], float64[:], float64, float64, boolean[:]"
+    "float64[:, :], float64[:, :], float64[:, :], float64[:, :], float64[:], float64[:], float64[:],"
+    "float64[:], float64[:], float64[:], float64[:], float64[:], float64[:], float64[:], float64[:], float64,"
+    "float64, boolean[:]"
 )
 def _grown(
+    d_m: FloatArray,
     clearance_m: FloatArray,
     block_from_s_m: FloatArray,
     block_to_s_m: FloatArray,
@@ -132,6 +137,8 @@ def _grown(
     since_s: FloatArray,
     spread_along_mps: FloatArray,
     spread_left_mps: FloatArray,
+    surprise_along_mps: FloatArray,
+    surprise_left_mps: FloatArray,
     speed_mps: FloatArray,
     change_along_mps2: FloatArray,
     change_left_mps2: FloatArray,
@@ -150,13 +157,15 @@ def _grown(
         for j in range(shape[1]):
             t = times_s[j] + since_s[k]
             furthest = (max_mps + speed_mps[k]) * t
-            across = min(spread_left_mps[k] * t + 0.5 * change_left_mps2[k] * t * t, furthest)
+            inwards_mps = max(-np.sign(d_m[k, j]) * surprise_left_mps[k], spread_left_mps[k])
+            across = min(inwards_mps * t + 0.5 * change_left_mps2[k] * t * t, furthest)
             if counts[k] and clearance_m[k, j] - (uncertain_left_m[k] + across) <= 0.0:
-                along = min(spread_along_mps[k] * t + 0.5 * change_along_mps2[k] * t * t, furthest)
-                along += uncertain_along_m[k]
+                changes_m = 0.5 * change_along_mps2[k] * t * t
+                back = min(max(-surprise_along_mps[k], spread_along_mps[k]) * t + changes_m, furthest)
+                on = min(max(surprise_along_mps[k], spread_along_mps[k]) * t + changes_m, furthest)
                 was_inside = True
-                lowest = min(lowest, block_from_s_m[k, j] - along - margin_m)
-                highest = max(highest, block_to_s_m[k, j] + along)
+                lowest = min(lowest, block_from_s_m[k, j] - back - uncertain_along_m[k] - margin_m)
+                highest = max(highest, block_to_s_m[k, j] + on + uncertain_along_m[k])
             inside[k, j], lo[k, j], hi[k, j] = was_inside, lowest, highest
     return inside, lo, hi
 
