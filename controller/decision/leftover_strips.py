@@ -20,14 +20,16 @@ from controller.decision.unseen_motion import (
     velocities_agree,
 )
 
-_REACH_M = 0.5  # a strip this near to a kept mover may be a part of it
+# A strip this near to a kept mover, across the view, may be a part of it. If it was judged standing, also along
+# the view: its place follows the edge of the view while the mover goes on.
+_REACH_M = 0.5
 
 
 def leftover_strips(bodies: Bodies, kept: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """(N,) which of the bodies kept (N,) are leftover strips.
 
-    They lie beside a mover that is kept and was seen for longer, go as it does, and either were seen to move
-    for MIN_TRACKED_S at most, or were judged standing although they hardly stood (hardly_stood).
+    They lie beside a mover that is kept and was seen for longer, and have its velocity. Either they were seen
+    to move for MIN_TRACKED_S at most, or they were judged standing too early (unseen_motion.hardly_stood).
     """
     older = kept & bodies.moving & (bodies.tracked_s > MIN_TRACKED_S)
     brief = np.where(bodies.moving, bodies.tracked_s <= MIN_TRACKED_S, hardly_stood(bodies))
@@ -37,5 +39,6 @@ def leftover_strips(bodies: Bodies, kept: NDArray[np.bool_]) -> NDArray[np.bool_
     others = bodies.select(older)
     velocity = np.where(bodies.moving[:, None], bodies.velocity_mps, bodies.measured_mps)
     alike = velocities_agree(replace(bodies, velocity_mps=velocity), others)
-    beside = others.covers(bodies.xy_m, bodies.half_view_m + _REACH_M, _REACH_M)
+    reach_m = bodies.half_view_m + np.where(bodies.moving, 0.0, _REACH_M)
+    beside = others.covers(bodies.xy_m, reach_m, _REACH_M)
     return np.asarray(strips & (beside & alike).any(axis=1))

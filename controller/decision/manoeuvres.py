@@ -29,7 +29,7 @@ class Manoeuvres:
 
     since_s: time before now for which their motion is uncertain, too.
     spread_along_mps, spread_left_mps: uncertainty of their velocities, along the path and across it.
-    surprise_along_mps, surprise_left_mps: by how much they may already be faster, signed.
+    surprise_along_mps, surprise_left_mps: by how much they may have changed further, as they are changing.
     speed_mps: measured speed.
     change_along_mps2, change_left_mps2: greatest change of their velocities.
     uncertain_along_m, uncertain_left_m: uncertainty of their positions.

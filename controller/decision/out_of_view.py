@@ -17,8 +17,9 @@ body of the last scene that is missing in this one is kept while its place is no
   6 s apply. A body that clearly approached may first be some decimetres late.
 * Moving, and another body is seen where it was expected: dropped only if the other one has been seen for more
   than 0.5 s and its velocity agrees within 2 sigma. Else both count: they may be two people.
-* A narrow strip that was seen to move for less than 0.5 s, within 0.5 m of a mover that is kept and was seen
-  for longer, with the same velocity within 2 sigma: dropped, it was the last visible part of that mover.
+* A narrow strip within 0.5 m of a mover that is kept and was seen for longer, with the same velocity within 2
+  sigma: dropped, it was the last visible part of that mover (controller/decision/leftover_strips.py). It was
+  seen to move for less than 0.5 s, or is judged standing, but was measured as moving, for 0.5 to 1 s.
 """
 
 from __future__ import annotations

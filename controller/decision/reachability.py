@@ -5,7 +5,8 @@ assumed:
 
 * A body may stop dead anywhere on its way, so the stretch of the path that it could block only grows.
 * A body may change its velocity by a bounded acceleration, up to the greatest obstacle speed V_omax.
-* The velocity of a body is known only with a spread.
+* The velocity of a body is known only with a spread. Where it has just changed, it may have changed by more,
+  but in the same direction: whoever walks out of the way faster and faster does not come back by that.
 
 A robot that cannot leave its path can guarantee no more than to stand when something touches it. So the
 emergency stop from each speed, latency included, is compared at each time with all that each body could
