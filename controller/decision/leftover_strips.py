@@ -20,8 +20,8 @@ from controller.decision.unseen_motion import (
     velocities_agree,
 )
 
-# A strip this near to a kept mover, across the view, may be a part of it. If it was judged standing, also along
-# the view: its place follows the edge of the view while the mover goes on.
+# A strip this near to a kept mover, across the view, may be a part of it. If it was judged standing, also
+# along the view: its place follows the edge of the view while the mover goes on.
 _REACH_M = 0.5
 
 
