@@ -35,6 +35,7 @@ from controller.decision.leftover_strips import leftover_strips
 from controller.decision.seen_through import SeenThrough, unproven
 from controller.decision.unseen_motion import (
     MIN_TRACKED_S,
+    as_tall_as_a_person,
     may_enter_way,
     significant_component,
     unseen_or_approaching,
@@ -60,8 +61,8 @@ _MOVING_KEPT_S, _MAY_ENTER_KEPT_S = 2.0, 6.0
 # it was last seen, this much more.
 _EDGE_TOLERANCE_M, _EDGE_TOLERANCE_MPS = 0.3, 0.15
 _MIN_AXIS_DISTANCE_M = 0.1  # least distance from the camera's axis of a mover that was not seen to come in
-# A body that approached up to this time before it was last seen has set off: one more measurement, of what
-# the edge of the view leaves of it, does not prove the opposite.
+# A body as tall as a person that approached up to this time before it was last seen has set off: one more
+# measurement, of what the edge of the view leaves of it, does not prove the opposite.
 _LATELY_NS = 200_000_000
 # A body out of view may have changed its velocity by this much per second.
 _VELOCITY_CHANGE_MPS2 = 0.25
@@ -149,16 +150,14 @@ class OutOfView:
     def _lately_approached(
         self, seen: Bodies, out: BoolArray, comes: BoolArray
     ) -> dict[int, tuple[int, FloatArray]]:
-        """Which of the bodies judged standing approached when they were last seen, or shortly before.
-
-        out, comes: of unseen_or_approaching.
-        """
+        """Which bodies judged standing have lately approached; out, comes: of unseen_or_approaching."""
         now_ns, lately = seen.captured_ns, {}
+        stands_tall = ~seen.moving & as_tall_as_a_person(seen)
         for k, track_id in enumerate(seen.ids.tolist()):
             before = self._approached.get(track_id)
             if comes[k]:
                 lately[track_id] = now_ns, seen.measured_mps[k]
-            elif before is not None and (out[k] or (not seen.moving[k] and now_ns - before[0] <= _LATELY_NS)):
+            elif before is not None and (out[k] or (stands_tall[k] and now_ns - before[0] <= _LATELY_NS)):
                 lately[track_id] = before
         return lately
 

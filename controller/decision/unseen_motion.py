@@ -64,6 +64,11 @@ def unseen_or_approaching(
     return out, comes
 
 
+def as_tall_as_a_person(bodies: Bodies) -> BoolArray:
+    """(N,) which bodies are."""
+    return np.asarray((bodies.top_m >= _PERSON_FROM_M) & (bodies.top_m <= _PERSON_TO_M))
+
+
 def significant_component(velocity_mps: FloatArray, covariance: FloatArray, along: FloatArray) -> float:
     """The velocity's component along a unit vector (2,); 0 if it is within one standard deviation of 0."""
     part_mps = float(velocity_mps @ along)

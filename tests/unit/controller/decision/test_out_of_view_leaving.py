@@ -101,7 +101,11 @@ def later(bodies: Bodies, frames: int) -> Bodies:
         pytest.param((measured(AT_EDGE, 0.0), expected(AT_EDGE, -0.4)), id="what is not seen proves nothing"),
         pytest.param(
             (measured(AT_EDGE, -0.4), later(measured(AT_EDGE, 0.0), 3), later(expected(AT_EDGE), 4)),
-            id="stood when it was seen last",
+            id="stood for long enough before it was seen last",
+        ),
+        pytest.param(
+            (measured(RACK, -0.4), later(measured(RACK, 0.0), 1), later(expected(RACK), 2)),
+            id="a rack that stood when it was seen last",
         ),
     ],
 )
