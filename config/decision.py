@@ -149,7 +149,7 @@ class Release(Section):
         default=0.25,
         ge=0,
         le=5,
-        description="an allowed speed this much above the present speed needs only far_delay_s",
+        description="while driving, an allowed speed this much above the present one needs only far_delay_s",
     )
     far_delay_s: float = Field(
         default=0.12,

@@ -11,6 +11,7 @@ The files in the order of one control step:
 * velocity_filter.py - averages the measured velocities; how fast those who set off may become
 * out_of_view.py - keeps bodies that have left the view
 * unseen_motion.py - which of them move, and with which velocity
+* leftover_strips.py - which of them are only the last visible part of another one
 * unseen_position.py - where the movers among them are expected
 * view_edges.py - what is below, above or beside the view
 * seen_through.py - whether the place of a body that went missing is seen, and seen empty

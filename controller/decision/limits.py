@@ -25,6 +25,8 @@ ALONG_TO_SIDE_RATIO = 2.0
 # Nothing corrects the expected place of a body out of view: while it is not seen, an error of this many
 # standard deviations of its velocity may add up.
 UNSEEN_ERROR_SIGMAS = 2.0
+# From this time on, that a body is out of view is told in a reason.
+_WORTH_TELLING_S = 1.0
 
 # Rules of a Reason that mean: something stands or moves in the way.
 BLOCKING_RULES: frozenset[Rule] = frozenset(
@@ -69,17 +71,22 @@ class Gap:
     closing_mps: its own speed towards the robot; negative if it drives away.
     leader_stop_m: how far it still goes ahead even if it brakes now.
     obstacle_id: None if it is not a tracked obstacle.
+    unseen_s: for how long it has not been seen.
     """
 
     distance_m: float
     closing_mps: float = 0.0
     leader_stop_m: float = 0.0
     obstacle_id: int | None = None
+    unseen_s: float = 0.0
 
     @property
     def name(self) -> str:
-        """What it is called in sentences."""
-        return "a surface" if self.obstacle_id is None else f"obstacle {self.obstacle_id}"
+        """What it is called in sentences. Out of view it is told for how long: it may have gone."""
+        if self.obstacle_id is None:
+            return "a surface"
+        unseen = f" (not seen for {self.unseen_s:.0f} s)" if self.unseen_s >= _WORTH_TELLING_S else ""
+        return f"obstacle {self.obstacle_id}{unseen}"
 
 
 def stop_before(

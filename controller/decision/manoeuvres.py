@@ -30,6 +30,7 @@ class Manoeuvres:
 
     since_s: time before now for which their motion is uncertain, too.
     spread_along_mps, spread_left_mps: uncertainty of their velocities, along the path and across it.
+    surprise_along_mps, surprise_left_mps: by how much they may have changed further, as they are changing.
     speed_mps: measured speed.
     change_along_mps2, change_left_mps2: greatest change of their velocities.
     uncertain_along_m, uncertain_left_m: uncertainty of their positions.
@@ -38,6 +39,8 @@ class Manoeuvres:
     since_s: Vector
     spread_along_mps: Vector
     spread_left_mps: Vector
+    surprise_along_mps: Vector
+    surprise_left_mps: Vector
     speed_mps: Vector
     change_along_mps2: Vector
     change_left_mps2: Vector
@@ -56,10 +59,11 @@ def manoeuvres_of(watched: Watched, prediction: Prediction) -> Manoeuvres:
 def _manoeuvres(
     bodies: Bodies, placed: Placed, velocities: PathVelocities, since_s: float, prediction: Prediction
 ) -> FloatArray:
-    """(8, N) the fields of Manoeuvres."""
+    """(10, N) the fields of Manoeuvres."""
     count = len(bodies.moving)
-    answers = np.zeros((8, count))
-    since, spread_along, spread_left, speed, along, sideways, uncertain_along, uncertain_left = answers
+    answers = np.zeros((10, count))
+    since, spread_along, spread_left, surprise_along, surprise_left = answers[:5]
+    speed, along, sideways, uncertain_along, uncertain_left = answers[5:]
     for k in range(count):
         along_mps, left_mps, unseen_s = velocities.along_mps[k], velocities.left_mps[k], bodies.unseen_s[k]
         sigma_along_mps, sigma_left_mps = velocities.sigma_along_mps[k], velocities.sigma_left_mps[k]
@@ -80,8 +84,10 @@ def _manoeuvres(
                 sideways[k] = prediction.oncoming_mps2
         since[k] = since_s + (0.0 if comes or leaves else unseen_s)
         speed[k] = math.hypot(along_mps, left_mps)
-        spread_along[k] = max(prediction.sigmas * sigma_along_mps, abs(velocities.innovation_along_mps[k]))
-        spread_left[k] = max(prediction.sigmas * sigma_left_mps, abs(velocities.innovation_left_mps[k]))
+        spread_along[k] = prediction.sigmas * sigma_along_mps
+        spread_left[k] = prediction.sigmas * sigma_left_mps
+        surprise_along[k] = velocities.innovation_along_mps[k]
+        surprise_left[k] = velocities.innovation_left_mps[k]
         if not leaves:
             uncertain_along[k] = UNSEEN_ERROR_SIGMAS * unseen_s * sigma_along_mps
             uncertain_left[k] = UNSEEN_ERROR_SIGMAS * unseen_s * sigma_left_mps

@@ -85,7 +85,7 @@ class MovingLimits:
         offers = []
         for one in conflicts:
             stays = self._when_it_stays(one, watched, s_m, motion)
-            offers.append((one, *self._offer(one, int(watched.bodies.ids[one.row]), ramps, s_m, stays)))
+            offers.append((one, *self._offer(one, watched.bodies, ramps, s_m, stays)))
         return self._settle(offers, watched.bodies, base_mps)
 
     def _in_the_way(self, watched: Watched, s_m: float, standing: bool) -> NDArray[np.intp]:
@@ -161,13 +161,14 @@ class MovingLimits:
             closing_mps=-along_mps,
             leader_stop_m=leader_stop_m,
             obstacle_id=int(watched.bodies.ids[conflict.row]),
+            unseen_s=float(watched.bodies.unseen_s[conflict.row]),
         )
         return stop_before(gap, motion, self._comfort, margins.stop_m, margins.least_m, rule, what)
 
     def _offer(
-        self, conflict: Conflict, track_id: int, ramps: SpeedRamps, s_m: float, stays: Limit
+        self, conflict: Conflict, bodies: Bodies, ramps: SpeedRamps, s_m: float, stays: Limit
     ) -> tuple[Choice, Limit]:
-        margins = self._config.margins
+        margins, track_id = self._config.margins, int(bodies.ids[conflict.row])
         first = track_id in self._robot_passes_first
         enter_s = margins.crossing_s * (0.5 if first else 1.0) + (0.0 if first else _SWITCH_MARGIN_S)
         choice = choices(conflict, ramps, self._speeds, s_m, margins.least_m, margins.crossing_s, enter_s)
@@ -179,9 +180,12 @@ class MovingLimits:
 
         def why() -> Reason:
             ahead_m, waits = conflict.lo_in_m - s_m, stays.reason
+            name = Gap(ahead_m, obstacle_id=track_id, unseen_s=float(bodies.unseen_s[conflict.row])).name
+            leaves = (
+                f"until {conflict.out_s:.1f} s from now" if math.isfinite(conflict.out_s) else "and stays"
+            )
             sentence = (
-                f"obstacle {track_id} crosses {max(ahead_m, 0.0):.1f} m ahead until "
-                f"{conflict.out_s:.1f} s from now: {allowed_text(choice.yield_mps)}"
+                f"{name} crosses {max(ahead_m, 0.0):.1f} m ahead {leaves}: {allowed_text(choice.yield_mps)}"
             )
             return Reason(
                 "crossing", sentence, track_id, ahead_m, waits.closing_mps, waits.required_m, waits.margin_m

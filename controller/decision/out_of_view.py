@@ -17,8 +17,9 @@ body of the last scene that is missing in this one is kept while its place is no
   6 s apply. A body that clearly approached may first be some decimetres late.
 * Moving, and another body is seen where it was expected: dropped only if the other one has been seen for more
   than 0.5 s and its velocity agrees within 2 sigma. Else both count: they may be two people.
-* A narrow strip that was seen to move for less than 0.5 s, within 0.5 m of a mover that is kept and was seen
-  for longer, with the same velocity within 2 sigma: dropped, it was the last visible part of that mover.
+* A narrow strip within 0.5 m of a mover that is kept and was seen for longer, with the same velocity within 2
+  sigma: dropped, it was the last visible part of that mover (controller/decision/leftover_strips.py). It was
+  seen to move for less than 0.5 s, or is judged standing, but was measured as moving, for 0.5 to 1 s.
 """
 
 from __future__ import annotations
@@ -29,10 +30,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.decision.bodies import Bodies, no_bodies
+from controller.decision.leftover_strips import leftover_strips
 from controller.decision.seen_through import SeenThrough, unproven
 from controller.decision.unseen_motion import (
-    MIN_MOVER_HALF_WIDTH_M,
     MIN_TRACKED_S,
+    as_tall_as_a_person,
     may_enter_way,
     unseen_or_approaching,
     velocities_agree,
@@ -59,7 +61,9 @@ IntArray = NDArray[np.int64]
 _SAME_PLACE_M = 0.25
 # How long a mover is kept: in general, and if it may come into the robot's way.
 _MOVING_KEPT_S, _MAY_ENTER_KEPT_S = 2.0, 6.0
-_STRIP_REACH_M = 0.5  # a strip this near to a kept mover may be a part of it
+# A body as tall as a person that approached up to this time before it was last seen has set off: one more
+# measurement, of what the edge of the view leaves of it, does not prove the opposite.
+_LATELY_NS = 200_000_000
 
 
 class OutOfView:
@@ -74,36 +78,33 @@ class OutOfView:
         self._seen_through = SeenThrough(mount)
         self._bodies = no_bodies(0)
         self._since_s: FloatArray = np.zeros(0)
-        # Of bodies that are judged standing but clearly approached: by id, the velocity measured last.
-        self._approach_velocity: dict[int, FloatArray] = {}
+        # Of bodies that are judged standing but clearly approached: by id, when last, and how fast.
+        self._approached: dict[int, tuple[int, FloatArray]] = {}
         self._widest_of, self._widest_half_m = np.zeros(0, np.int64), np.zeros(0)
 
     def mark_leaving_movers(self, seen: Bodies, pose: PlanarPose, edges: ViewEdges) -> Bodies:
         """The seen bodies, of which some that are judged standing are made moving.
 
-        These are the ones that approached the robot's axis when last seen, which perception now only predicts
-        (unseen_s > 0), and whose place is out of view. They get the velocity measured last, and set off.
+        These are the ones that approached the robot's axis when last seen or just before, which perception
+        now only predicts (unseen_s > 0), and whose place is out of view. They set off with that velocity.
         """
         if not len(seen):
-            self._widest_of, self._approach_velocity = seen.ids, {}
+            self._widest_of, self._approached = seen.ids, {}
             return seen
         # The edge of the view cuts bodies off, so the present width says little.
         self._widest_half_m = _widest(seen.ids, seen.half_across_m, self._widest_of, self._widest_half_m)
         self._widest_of = seen.ids
         out, comes = unseen_or_approaching(seen, self._widest_half_m, pose)
-        if not self._approach_velocity and not np.count_nonzero(comes):
+        if not self._approached and not np.count_nonzero(comes):
             return seen
-        ids, before = seen.ids.tolist(), self._approach_velocity
-        self._approach_velocity = {ids[k]: seen.measured_mps[k] for k in np.flatnonzero(comes).tolist()}
-        self._approach_velocity |= {
-            ids[k]: before[ids[k]] for k in np.flatnonzero(out).tolist() if ids[k] in before
-        }
-        came = np.array([one in self._approach_velocity for one in ids], np.bool_)
+        self._approached = self._lately_approached(seen, out, comes)
+        ids = seen.ids.tolist()
+        came = np.array([one in self._approached for one in ids], np.bool_)
         leaves = out & came & self._outside_view(seen, pose, edges)
         if not leaves.any():
             return seen
         velocity = seen.velocity_mps.copy()
-        velocity[leaves] = [self._approach_velocity[ids[k]] for k in np.flatnonzero(leaves).tolist()]
+        velocity[leaves] = [self._approached[ids[k]][1] for k in np.flatnonzero(leaves).tolist()]
         innovation = np.where(leaves[:, None], missing_to_walking(velocity), seen.innovation_mps)
         moving = seen.moving | leaves
         return replace(seen, velocity_mps=velocity, innovation_mps=innovation, moving=moving)
@@ -145,6 +146,20 @@ class OutOfView:
         self._bodies = bodies
         return bodies
 
+    def _lately_approached(
+        self, seen: Bodies, out: BoolArray, comes: BoolArray
+    ) -> dict[int, tuple[int, FloatArray]]:
+        """Which bodies judged standing have lately approached; out, comes: of unseen_or_approaching."""
+        now_ns, lately = seen.captured_ns, {}
+        stands_tall = ~seen.moving & as_tall_as_a_person(seen)
+        for k, track_id in enumerate(seen.ids.tolist()):
+            before = self._approached.get(track_id)
+            if comes[k]:
+                lately[track_id] = now_ns, seen.measured_mps[k]
+            elif before is not None and (out[k] or (stands_tall[k] and now_ns - before[0] <= _LATELY_NS)):
+                lately[track_id] = before
+        return lately
+
     def _with_missing(
         self, before: Bodies, seen: Bodies, dt_s: float, standing: bool
     ) -> tuple[Bodies, FloatArray]:
@@ -174,7 +189,7 @@ class OutOfView:
         kept_s = np.where(may_enter_way(bodies, pose), _MAY_ENTER_KEPT_S, _MOVING_KEPT_S)
         timely = ~bodies.moving | (since_s <= kept_s)
         kept = _still_kept(out & timely, part_of, bodies.ids, seen.ids)
-        return kept & ~_leftover_strips(bodies, kept)
+        return kept & ~leftover_strips(bodies, kept)
 
     def _outside_view(self, bodies: Bodies, pose: PlanarPose, edges: ViewEdges) -> BoolArray:
         """(N,) which are beside, below or above the view, and not far behind the camera (out_of_view).
@@ -182,21 +197,6 @@ class OutOfView:
         The side edge has a tolerance for the uncertainty of the position, which grows for movers.
         """
         return out_of_view(bodies, pose, self._mount, edges, EDGE_TOLERANCE_M, EDGE_TOLERANCE_MPS)
-
-
-def _leftover_strips(bodies: Bodies, kept: BoolArray) -> BoolArray:
-    """(N,) narrow strips that were seen to move only briefly, beside a kept mover they may be a part of.
-
-    That mover was seen for longer, and the velocities agree.
-    """
-    older = kept & bodies.moving & (bodies.tracked_s > MIN_TRACKED_S)
-    narrow = bodies.half_across_m < MIN_MOVER_HALF_WIDTH_M
-    strips = bodies.moving & narrow & (bodies.tracked_s <= MIN_TRACKED_S)
-    if not (older.any() and strips.any()):
-        return np.zeros(len(bodies), np.bool_)
-    others = bodies.select(older)
-    beside = others.covers(bodies.xy_m, bodies.half_view_m, _STRIP_REACH_M) & velocities_agree(bodies, others)
-    return np.asarray(strips & beside.any(axis=1))
 
 
 @compiled("int64[:], int64[:]")

@@ -5,7 +5,8 @@ assumed:
 
 * A body may stop dead anywhere on its way, so the stretch of the path that it could block only grows.
 * A body may change its velocity by a bounded acceleration, up to the greatest obstacle speed V_omax.
-* The velocity of a body is known only with a spread.
+* The velocity of a body is known only with a spread. Where it has just changed, it may have changed by more,
+  but in the same direction: whoever walks out of the way faster and faster does not come back by that.
 
 A robot that cannot leave its path can guarantee no more than to stand when something touches it. So the
 emergency stop from each speed, latency included, is compared at each time with all that each body could
@@ -112,13 +113,17 @@ def _grown(
         for j in range(shape[1]):
             t = times_s[j] + by.since_s[k]
             furthest = (max_mps + by.speed_mps[k]) * t
-            across = min(by.spread_left_mps[k] * t + 0.5 * by.change_left_mps2[k] * t * t, furthest)
+            inwards_mps = max(-np.sign(placed.d_m[k, j]) * by.surprise_left_mps[k], by.spread_left_mps[k])
+            across = min(inwards_mps * t + 0.5 * by.change_left_mps2[k] * t * t, furthest)
             if counts[k] and placed.clearance_m[k, j] - (by.uncertain_left_m[k] + across) <= 0.0:
-                along = min(by.spread_along_mps[k] * t + 0.5 * by.change_along_mps2[k] * t * t, furthest)
-                along += by.uncertain_along_m[k]
+                changes_m = 0.5 * by.change_along_mps2[k] * t * t
+                back_mps = max(-by.surprise_along_mps[k], by.spread_along_mps[k])
+                on_mps = max(by.surprise_along_mps[k], by.spread_along_mps[k])
+                back = min(back_mps * t + changes_m, furthest) + by.uncertain_along_m[k]
+                on = min(on_mps * t + changes_m, furthest) + by.uncertain_along_m[k]
                 was_inside = True
-                lowest = min(lowest, placed.block_from_s_m[k, j] - along - margin_m)
-                highest = max(highest, placed.block_to_s_m[k, j] + along)
+                lowest = min(lowest, placed.block_from_s_m[k, j] - back - margin_m)
+                highest = max(highest, placed.block_to_s_m[k, j] + on)
             inside[k, j], lo[k, j], hi[k, j] = was_inside, lowest, highest
     return inside, lo, hi
 

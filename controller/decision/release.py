@@ -71,9 +71,10 @@ class ReleaseGate:
 
     The target rises to the minimum of the last delay_s, so that one free moment does not make the robot go,
     nor one high value make it fast. If the minimum of the shorter far_delay_s is far above the present speed
-    (far_mps), that one is used: before the difference is driven, there is time to look again. After a change
-    from faster to slower, the next increase comes no sooner than hold_s later, and then only for a gain of
-    worth_mps: within hold_s the speed changes its direction at most twice.
+    (far_mps), that one is used: before the difference is driven, there is time to look again. Not from rest:
+    whoever comes into view right before the nose needs about delay_s to become known, and people follow each
+    other. After a change from faster to slower, the next increase comes no sooner than hold_s later, and then
+    only for a gain of worth_mps: within hold_s the speed changes its direction at most twice.
     """
 
     def __init__(self, config: Release) -> None:
@@ -97,7 +98,7 @@ class ReleaseGate:
         """
         band = self._config.dead_band_mps
         min_mps, far_mps = self._delayed_min.update(raw_mps, now_ns), self._recent_min.update(raw_mps, now_ns)
-        if far_mps >= v_mps + self._config.far_mps:
+        if v_mps > STANDING_MPS and far_mps >= v_mps + self._config.far_mps:
             min_mps = far_mps
         if raw_mps < self._held_mps - band or raw_mps <= 0.0:
             self._rising = False

@@ -40,7 +40,7 @@ class _Near:
 
     track_id: its id.
     block_from_s_m, block_to_s_m, clearance_m: see corridor.Placed.
-    age_s: since it was first seen.
+    age_s, unseen_s: since it was first and last seen.
     stop_m: distance from it at which the robot stands.
     """
 
@@ -49,6 +49,7 @@ class _Near:
     block_to_s_m: float
     clearance_m: float
     age_s: float
+    unseen_s: float
     stop_m: float
 
 
@@ -85,7 +86,7 @@ class StandingLimits:
             if near.clearance_m > beside_m:
                 self._inside.discard(track_id)
                 continue
-            gap = Gap(gap_m, obstacle_id=track_id)
+            gap = Gap(gap_m, obstacle_id=track_id, unseen_s=near.unseen_s)
             if self._may_wait(gap, motion, near.age_s):
                 continue
             self._inside.add(track_id)
@@ -116,7 +117,13 @@ class StandingLimits:
         if len(rows):
             stop_m = self._stop_distances(known, bodies, placed)
             fields = _columns(
-                rows, placed.block_from_s_m, placed.block_to_s_m, clearance_m, bodies.age_s, stop_m
+                rows,
+                placed.block_from_s_m,
+                placed.block_to_s_m,
+                clearance_m,
+                bodies.age_s,
+                bodies.unseen_s,
+                stop_m,
             ).tolist()
             track_ids = bodies.ids[rows].tolist()
             self._near = [_Near(one, *others) for one, others in zip(track_ids, fields, strict=True)]
@@ -178,20 +185,22 @@ class StandingLimits:
         return needed <= gap.distance_m
 
 
-@compiled("int64[:], float64[:, :], float64[:, :], float64[:], float64[:], float64[:]")
+@compiled("int64[:], float64[:, :], float64[:, :], float64[:], float64[:], float64[:], float64[:]")
 def _columns(
     rows: NDArray[np.intp],
     block_from_s_m: FloatArray,
     block_to_s_m: FloatArray,
     clearance_m: FloatArray,
     age_s: FloatArray,
+    unseen_s: FloatArray,
     stop_m: FloatArray,
 ) -> FloatArray:
-    """(R, 5) the fields of _Near except track_id, for the bodies rows (R,)."""
-    near = np.empty((len(rows), 5))
+    """(R, 6) the fields of _Near except track_id, for the bodies rows (R,)."""
+    near = np.empty((len(rows), 6))
     for i in range(len(rows)):
         k = rows[i]
-        near[i] = block_from_s_m[k, 0], block_to_s_m[k, 0], clearance_m[k], age_s[k], stop_m[k]
+        near[i, :2] = block_from_s_m[k, 0], block_to_s_m[k, 0]
+        near[i, 2:] = clearance_m[k], age_s[k], unseen_s[k], stop_m[k]
     return near
 
 

@@ -22,6 +22,9 @@ MIN_TRACKED_S = 0.5
 # A body that is judged standing counts as approaching if it is faster than both thresholds. Noise makes
 # standing things beside the view seem to creep now and then; lower thresholds would slow the robot each time.
 _APPROACH_MIN_SIGMAS, _APPROACH_MIN_MPS = 3.3, 0.2
+# Lower thresholds for what is as tall as a person: few racks and crates are, so noise slows the robot rarely.
+_PERSON_MIN_SIGMAS, _PERSON_MIN_MPS = 2.5, 0.15
+_PERSON_FROM_M, _PERSON_TO_M = 1.2, 2.2
 # No person or vehicle is as narrow as this, but ends of racks are. Half of the greatest width that was seen.
 MIN_MOVER_HALF_WIDTH_M = 0.1
 # A speed above this many standard deviations is certain: the body will not be found where it was last seen.
@@ -41,11 +44,17 @@ def unseen_or_approaching(
     """Two masks (N,) of the bodies judged standing: not seen in this scene; and seen, but approaching.
 
     Approaching: the measured velocity towards the axis of a robot at pose (the line straight ahead) exceeds
-    the noise. A body is in neither mask if it was tracked for MIN_TRACKED_S or less, or was never wider than
-    MIN_MOVER_HALF_WIDTH_M. widest_half_m (N,): half of the greatest width that each was seen with.
+    the noise; of a body as tall as a person, less suffices. A body is in neither mask if it was tracked for
+    MIN_TRACKED_S or less, or was never wider than MIN_MOVER_HALF_WIDTH_M. widest_half_m (N,): half of the
+    greatest width that each was seen with.
     """
     out, comes = _unseen_or_approaching(bodies, widest_half_m, pose)
     return out, comes
+
+
+def as_tall_as_a_person(bodies: Bodies) -> BoolArray:
+    """(N,) which bodies are."""
+    return np.asarray((bodies.top_m >= _PERSON_FROM_M) & (bodies.top_m <= _PERSON_TO_M))
 
 
 def significant_component(velocity_mps: FloatArray, covariance: FloatArray, along: FloatArray) -> float:
@@ -77,16 +86,17 @@ def with_measured_velocity(bodies: Bodies, mistaken_mps: float) -> Bodies:
     _SURE_MOVE_SIGMAS and _APPROACH_MIN_MPS. A speed above mistaken_mps is an error of measurement and is not
     used.
     """
-    squared = np.einsum("ni,ni->n", bodies.measured_mps, bodies.measured_mps)
-    # The variance of the speed along the velocity's own direction is v' C v / v'v; this is v' C v.
-    variance = np.einsum("ni,nij,nj->n", bodies.measured_mps, bodies.covariance, bodies.measured_mps)
-    goes = ~bodies.moving & (bodies.tracked_s >= MIN_TRACKED_S) & (bodies.tracked_s < _VERDICT_TRUSTED_S)
-    goes &= (squared**2 > _SURE_MOVE_SIGMAS**2 * variance) & (squared > _APPROACH_MIN_MPS**2)
-    goes &= squared <= mistaken_mps**2
+    goes = _before_verdict(bodies) & _faster_than(bodies, _SURE_MOVE_SIGMAS)
+    goes &= np.hypot(bodies.measured_mps[:, 0], bodies.measured_mps[:, 1]) <= mistaken_mps
     if not goes.any():
         return bodies
     velocity = np.where(goes[:, None], bodies.measured_mps, bodies.velocity_mps)
     return replace(bodies, velocity_mps=velocity, moving=bodies.moving | goes)
+
+
+def hardly_stood(bodies: Bodies) -> BoolArray:
+    """(N,) which bodies were judged standing before a verdict can be trusted, and measured as moving."""
+    return _before_verdict(bodies) & _faster_than(bodies, _APPROACH_MIN_SIGMAS)
 
 
 def velocities_agree(bodies: Bodies, seen: Bodies) -> BoolArray:
@@ -100,6 +110,20 @@ def velocities_agree(bodies: Bodies, seen: Bodies) -> BoolArray:
     differs = bodies.velocity_mps[:, None] - seen.measured_mps
     same = np.all(differs**2 <= _SAME_VELOCITY_SIGMAS**2 * (spread + seen_spread), axis=2)
     return np.asarray(same & (seen.tracked_s > MIN_TRACKED_S))
+
+
+def _before_verdict(bodies: Bodies) -> BoolArray:
+    """(N,) which bodies are judged standing, tracked for MIN_TRACKED_S to _VERDICT_TRUSTED_S only."""
+    told = (bodies.tracked_s >= MIN_TRACKED_S) & (bodies.tracked_s < _VERDICT_TRUSTED_S)
+    return np.asarray(~bodies.moving & told)
+
+
+def _faster_than(bodies: Bodies, sigmas: float) -> BoolArray:
+    """(N,) whose measured speed is above this many standard deviations, and above _APPROACH_MIN_MPS."""
+    squared = np.einsum("ni,ni->n", bodies.measured_mps, bodies.measured_mps)
+    # The variance of the speed along the velocity's own direction is v' C v / v'v; this is v' C v.
+    variance = np.einsum("ni,nij,nj->n", bodies.measured_mps, bodies.covariance, bodies.measured_mps)
+    return np.asarray((squared**2 > sigmas**2 * variance) & (squared > _APPROACH_MIN_MPS**2))
 
 
 @compiled(Bodies, "float64[:]", PlanarPose)
@@ -119,6 +143,9 @@ def _unseen_or_approaching(bodies: Bodies, widest_half_m: FloatArray, pose: Plan
         left_mps = bodies.measured_mps[k, 1] * cos - bodies.measured_mps[k, 0] * sin
         spread = bodies.covariance[k]
         variance = (spread[0, 0] * sin - (spread[0, 1] + spread[1, 0]) * cos) * sin + spread[1, 1] * cos * cos
-        clear_mps = max(_APPROACH_MIN_SIGMAS * math.sqrt(variance), _APPROACH_MIN_MPS)
+        sigmas, least_mps = _APPROACH_MIN_SIGMAS, _APPROACH_MIN_MPS
+        if _PERSON_FROM_M <= bodies.top_m[k] <= _PERSON_TO_M:
+            sigmas, least_mps = _PERSON_MIN_SIGMAS, _PERSON_MIN_MPS
+        clear_mps = max(sigmas * math.sqrt(variance), least_mps)
         comes[k] = not out[k] and -np.sign(left_m) * left_mps > clear_mps
     return answers

@@ -107,7 +107,11 @@ class WorstCase:
                 # An emergency stop is still in time. Braking for each small fluctuation would only cost time.
                 speed = motion.v_mps
         nearest = int(np.where(rows, placed.block_from_s_m[:, 0], math.inf).argmin())
-        gap = Gap(float(placed.block_from_s_m[nearest, 0]) - s_m, obstacle_id=int(bodies.ids[nearest]))
+        gap = Gap(
+            float(placed.block_from_s_m[nearest, 0]) - s_m,
+            obstacle_id=int(bodies.ids[nearest]),
+            unseen_s=float(bodies.unseen_s[nearest]),
+        )
         return Limit(speed, lambda: _reason(gap, speed), urgent)
 
     def _too_late(self, motion: Motion, s_m: float, reached: Reach, counts: NDArray[np.bool_]) -> bool:

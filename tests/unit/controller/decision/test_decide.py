@@ -113,3 +113,22 @@ def test_closing_in_on_the_target_is_no_wish_to_go_faster(
     decision = bench.step(bench.scene(x_m=x_m), v_mps, a_mps2, x_m=x_m)
     assert decision.reason.rule == "target"
     assert decision.action is action
+
+
+@pytest.mark.parametrize(
+    ("forward_mps", "rule", "what"),
+    [
+        (0.0, "static", "stands on the path 0.8 m ahead"),
+        (-0.15, "worst case", "could step into the way"),
+        (-0.3, "crossing", "crosses 0.3 m ahead and stays"),
+    ],
+)
+def test_what_is_waited_for_out_of_view_is_told_as_not_seen(forward_mps: float, rule: str, what: str) -> None:
+    """Below the view of a camera that sees the floor from 1.3 m on; somebody may have carried it away."""
+    bench, pallet = Bench(), obstacle(2.2, 0.0, forward_mps, size_m=(0.5, 0.1))
+    bench.settle(pallet, v_mps=0.3)
+    for _ in range(76):
+        decision = bench.step(bench.scene(x_m=0.8), 0.05, x_m=0.8)
+    assert decision.reason.rule == rule
+    assert decision.reason.sentence.startswith("obstacle 5 (not seen for 2 s)")
+    assert what in decision.reason.sentence

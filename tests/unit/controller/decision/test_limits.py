@@ -25,6 +25,17 @@ def test_obstacle_far_enough_limits_nothing_and_states_its_margin() -> None:
     assert reason.sentence.startswith("obstacle 3 stands 6.0 m ahead: at most 1.")
 
 
+def test_a_body_that_is_remembered_is_told_as_not_seen() -> None:
+    """Whoever finds the robot waiting sees nothing there, and should know what it waits for."""
+
+    def told(unseen_s: float) -> str:
+        gap = Gap(0.7, obstacle_id=3, unseen_s=unseen_s)
+        return stop_before(gap, Motion(0.0, 0.0, 0.2), COMFORT, 0.7, 0.2, "static", "stands").reason.sentence
+
+    assert told(12.3) == "obstacle 3 (not seen for 12 s) stands 0.7 m ahead: stop"
+    assert told(0.9) == "obstacle 3 stands 0.7 m ahead: stop"
+
+
 def test_comfort_is_urgent_when_less_than_the_least_margin_would_be_left() -> None:
     def urgent(distance_m: float) -> bool:
         motion = Motion(1.5, 0.0, 0.2)

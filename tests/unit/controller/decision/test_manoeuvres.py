@@ -54,11 +54,12 @@ def test_its_speed_and_twice_the_spread_of_its_velocity() -> None:
     assert may_do.spread_left_mps[0] == pytest.approx(0.2)
 
 
-def test_a_velocity_that_has_just_changed_is_known_no_better_than_by_that_change() -> None:
+def test_a_velocity_that_has_just_changed_may_have_changed_by_more_in_the_same_direction() -> None:
     body = replace(box(5.0, 2.0, 0.3, -0.4, sigma_mps=0.1), innovation_mps=np.array([[-0.7, 0.6]]))
     may_do = found(body)
-    assert may_do.spread_along_mps[0] == pytest.approx(0.7)
-    assert may_do.spread_left_mps[0] == pytest.approx(0.6)
+    assert may_do.surprise_along_mps[0] == pytest.approx(-0.7)
+    assert may_do.surprise_left_mps[0] == pytest.approx(0.6)
+    assert may_do.spread_along_mps[0] == may_do.spread_left_mps[0] == pytest.approx(0.2)
 
 
 def test_body_that_comes_or_leaves_has_not_turned_out_of_view() -> None:

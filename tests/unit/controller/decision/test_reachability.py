@@ -27,12 +27,13 @@ CORRIDOR = Corridor(line_path(), Body(width_m=0.8, length_m=1.0, rear_m=0.5))
 def manoeuvres(
     since_s: float = 0.0,
     spread_mps: tuple[float, float] = (0.0, 0.0),
+    surprise_mps: tuple[float, float] = (0.0, 0.0),
     speed_mps: float = 0.0,
     change_mps2: float = 0.0,
     uncertain_m: tuple[float, float] = (0.0, 0.0),
 ) -> Manoeuvres:
     """Of one body; pairs: along the path and across it."""
-    each = (since_s, *spread_mps, speed_mps, change_mps2, change_mps2, *uncertain_m)
+    each = (since_s, *spread_mps, *surprise_mps, speed_mps, change_mps2, change_mps2, *uncertain_m)
     return Manoeuvres(*(np.array([value]) for value in each))
 
 
@@ -43,7 +44,9 @@ def grown(body: Bodies, may_do: Manoeuvres, since_s: float = 0.0) -> Reach:
 
 def reached(body: Bodies, sigma_mps: float = 0.0, manoeuvre_mps2: float = 0.0, since_s: float = 0.0) -> Reach:
     speed_mps = float(np.linalg.norm(body.velocity_mps))
-    return grown(body, manoeuvres(since_s, (sigma_mps, sigma_mps), speed_mps, manoeuvre_mps2), since_s)
+    return grown(
+        body, manoeuvres(since_s, (sigma_mps, sigma_mps), (0.0, 0.0), speed_mps, manoeuvre_mps2), since_s
+    )
 
 
 def stop_from(v_mps: float, latency_s: float = 0.0) -> SpeedRamps:
@@ -157,6 +160,23 @@ def test_spread_across_the_path_reaches_it_and_spread_along_does_not() -> None:
     body = box(5.0, 0.65 + 0.9, 0.01, 0.0)
     assert not grown(body, manoeuvres(spread_mps=(0.5, 0.0))).inside.any()
     assert grown(body, manoeuvres(spread_mps=(0.0, 0.5))).inside.any()
+
+
+@pytest.mark.parametrize("left_m", [0.65 + 0.9, -0.65 - 0.9])
+def test_who_becomes_faster_may_come_in_only_if_that_leads_towards_the_way(left_m: float) -> None:
+    inwards_mps, body = -np.sign(left_m) * 0.5, box(5.0, left_m, 0.01, 0.0)
+    assert grown(body, manoeuvres(surprise_mps=(0.0, inwards_mps))).inside.any()
+    assert not grown(body, manoeuvres(surprise_mps=(0.0, -inwards_mps))).inside.any()
+    assert not grown(body, manoeuvres(surprise_mps=(0.5, 0.0))).inside.any()
+
+
+def test_who_becomes_faster_along_the_path_comes_nearer_on_one_side_only() -> None:
+    body = box(5.0, 0.0, 0.01, 0.0)
+    same, on, back = (grown(body, manoeuvres(surprise_mps=(mps, 0.0))) for mps in (0.0, 0.5, -0.5))
+    assert on.block_from_s_m[0, -1] == same.block_from_s_m[0, -1]
+    assert on.block_to_s_m[0, -1] == pytest.approx(same.block_to_s_m[0, -1] + 0.5 * TIMES[-1])
+    assert back.block_from_s_m[0, -1] == pytest.approx(same.block_from_s_m[0, -1] - 0.5 * TIMES[-1], abs=0.05)
+    assert back.block_to_s_m[0, -1] == same.block_to_s_m[0, -1]
 
 
 def test_a_stop_that_is_over_in_time_needs_no_room() -> None:

@@ -55,23 +55,36 @@ def test_a_rising_target_waits_for_a_free_way() -> None:
 
 
 def test_release_to_a_much_higher_speed_waits_less_long() -> None:
+    gate = rolling()
+    assert gate.hold(0.6, 0.1) == 0.1
+    assert gate.hold(0.6, 0.06) == 0.6
+
+
+def rolling() -> Gate:
+    """At 0.1 m/s, which is all that has been allowed for long."""
+    gate = Gate(0.1)
+    gate.step(1.0)
+    gate.hold(0.1, 3.0)
+    gate.v = 0.1
+    return gate
+
+
+def test_release_from_rest_never_waits_less_long() -> None:
+    """Who follows somebody that has just gone by comes into view right before the nose."""
     gate = Gate(0.0)
     gate.step(1.0)
     gate.hold(0.0, 3.0)
     gate.v = 0.0
-    assert gate.hold(0.6, 0.1) == 0.0
-    assert gate.hold(0.6, 0.06) == 0.6
+    assert gate.hold(1.5, 0.28) == 0.0
+    assert gate.hold(1.5, 0.06) == 1.5
 
 
 def test_far_above_the_speed_counts_the_least_of_that_time() -> None:
     """A single frame that is not free: no more than it showed, until far_delay_s after it."""
-    gate = Gate(0.0)
-    gate.step(1.0)
-    gate.hold(0.0, 3.0)
-    gate.v = 0.0
+    gate = rolling()
     gate.hold(1.5, 0.06)
     gate.step(0.2)
-    assert gate.hold(1.5, 0.1) == 0.0
+    assert gate.hold(1.5, 0.1) == 0.1
     assert gate.hold(1.5, 0.06) == 1.5
 
 

@@ -1,0 +1,44 @@
+"""Narrow strips that are the last visible parts of a mover that has left the view.
+
+As a mover is cut off at the edge of the view, what is still seen of it may become a track of its own, which
+is hardly measured and soon gone. controller/decision/out_of_view.py asks which of the bodies that it would
+keep are such strips: the mover is kept himself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.decision.bodies import Bodies
+from controller.decision.unseen_motion import (
+    MIN_MOVER_HALF_WIDTH_M,
+    MIN_TRACKED_S,
+    hardly_stood,
+    velocities_agree,
+)
+
+# A strip this near to a kept mover, across the view, may be a part of it. If it was judged standing, also
+# along the view: its place follows the edge of the view while the mover goes on.
+_REACH_M = 0.5
+
+
+def leftover_strips(bodies: Bodies, kept: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(N,) which of the bodies kept (N,) are leftover strips.
+
+    They lie beside a mover that is kept and was seen for longer, and have its velocity. Either they were seen
+    to move for MIN_TRACKED_S at most, or they were judged standing too early (unseen_motion.hardly_stood).
+    """
+    older = kept & bodies.moving & (bodies.tracked_s > MIN_TRACKED_S)
+    brief = np.where(bodies.moving, bodies.tracked_s <= MIN_TRACKED_S, hardly_stood(bodies))
+    strips = brief & (bodies.half_across_m < MIN_MOVER_HALF_WIDTH_M)
+    if not (older.any() and strips.any()):
+        return np.zeros(len(bodies), np.bool_)
+    others = bodies.select(older)
+    velocity = np.where(bodies.moving[:, None], bodies.velocity_mps, bodies.measured_mps)
+    alike = velocities_agree(replace(bodies, velocity_mps=velocity), others)
+    reach_m = bodies.half_view_m + np.where(bodies.moving, 0.0, _REACH_M)
+    beside = others.covers(bodies.xy_m, reach_m, _REACH_M)
+    return np.asarray(strips & (beside & alike).any(axis=1))

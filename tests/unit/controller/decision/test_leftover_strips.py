@@ -1,0 +1,75 @@
+"""The last strips of somebody who leaves the view: they go with him."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from controller.decision.bodies import Bodies, no_bodies
+from controller.decision.out_of_view import OutOfView
+from hal.types import PlanarPose
+from tests.support.floor_bodies import box
+from tests.support.recall import EDGES, FRAME_NS, MOUNT, NOTHING_SEEN
+
+HERE = PlanarPose(0.0, 0.0, 0.0)
+WALKER = box(2.0, 1.5, 0.0, 1.0, sigma_mps=0.1)
+
+
+def strip(
+    y_m: float = 1.3,
+    vy_mps: float = 0.01,
+    half_across_m: float = 0.02,
+    sigma_mps: float = 1.5,
+    age_s: float = 0.07,
+) -> Bodies:
+    """Of which two frames told that it moves, though not where to."""
+    return box(2.0, y_m, 0.0, vy_mps, number=2, half_across_m=half_across_m, sigma_mps=sigma_mps, age_s=age_s)
+
+
+def left_behind(*bodies: Bodies) -> list[int]:
+    """The ids of who is reckoned with once all of them are out of view."""
+    view, before = OutOfView(MOUNT, 1.5), bodies[0]
+    for one in bodies[1:]:
+        before = before.joined(one)
+    kept = view.update(before, no_bodies(FRAME_NS), HERE, EDGES, False, NOTHING_SEEN)
+    return [int(one) for one in kept.ids]
+
+
+def limb(
+    left_mps: float = 0.8, age_s: float = 0.6, half_across_m: float = 0.02, ahead_m: float = 2.5
+) -> Bodies:
+    """Judged standing, though measured with a walker's velocity: a part of him that is a track of its own."""
+    part = box(ahead_m, 1.1, number=2, half_across_m=half_across_m, sigma_mps=0.2, age_s=age_s)
+    return replace(part, measured_mps=np.array([[0.05, left_mps]]))
+
+
+def test_the_last_strip_of_a_walker_to_be_in_view_goes_with_him() -> None:
+    assert left_behind(WALKER, strip()) == [1]
+
+
+def test_a_limb_of_a_walker_that_was_judged_standing_goes_with_him() -> None:
+    """It would be waited for, where it was last seen, without end."""
+    assert left_behind(WALKER, limb()) == [1]
+
+
+@pytest.mark.parametrize(
+    "bodies",
+    [
+        pytest.param((WALKER, strip(half_across_m=0.15)), id="as wide as somebody"),
+        pytest.param((WALKER, strip(age_s=0.6)), id="seen for long enough"),
+        pytest.param((WALKER, strip(vy_mps=-1.0, sigma_mps=0.2)), id="goes elsewhere"),
+        pytest.param((WALKER, strip(y_m=0.7)), id="not beside him"),
+        pytest.param((box(2.0, 1.5), strip()), id="beside what stands"),
+        pytest.param((WALKER, limb(left_mps=0.6)), id="stands, as far as noise lets tell"),
+        pytest.param((WALKER, limb(left_mps=-0.8)), id="judged standing, and went elsewhere"),
+        pytest.param((WALKER, limb(age_s=1.1)), id="judged standing for long"),
+        pytest.param((WALKER, limb(half_across_m=0.15)), id="judged standing, as wide as somebody"),
+        pytest.param((WALKER, limb(ahead_m=1.0)), id="judged standing, not beside him"),
+        pytest.param((box(2.0, 1.5), limb()), id="judged standing, beside what stands"),
+        pytest.param((box(2.0, 0.2, 0.0, 1.0), strip(y_m=0.8)), id="beside who is in view, and has gone"),
+    ],
+)
+def test_no_other_strip_does(bodies: tuple[Bodies, ...]) -> None:
+    assert 2 in left_behind(*bodies)
