@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from config.perception import PerceptionConfig
+from config.perception import DepthNoise, PerceptionConfig
 from hal.compiled import compiled
-from hal.types import FloatArray, RgbdFrame
+from hal.types import FloatArray, Pose, RgbdFrame
 from vision.bodies.births import MIN_CELLS
 from vision.bodies.tracks import Tracks
 from vision.depth.depth_mask import surface_depth
@@ -88,62 +88,34 @@ def bodies_needing_fragments(
     tracks: Tracks, detection: Detection, config: PerceptionConfig
 ) -> NeedsFragments:
     """The tracks seen in this frame that have too few fragments."""
-    noise = config.depth_noise
     chosen, depth_m, gate_m, urgent = _needing_fragments(
-        tracks.state,
-        tracks.extent_m,
-        tracks.moving,
-        tracks.evidence,
-        tracks.fragments,
-        tracks.cells,
-        tracks.sightings,
-        tracks.seen_ns,
-        detection.captured_ns,
-        detection.pose.rotation,
-        detection.pose.translation_m,
-        noise.floor_m,
-        noise.quadratic_per_m,
+        tracks, detection.captured_ns, detection.pose, config.depth_noise
     )
     return NeedsFragments(tracks.ids[chosen], tracks.bbox_px[chosen], depth_m, gate_m, urgent)
 
 
-@compiled(
-    "float64[:, :], float64[:, :], bool_[:], float64[:], int64[:], int64[:], int64[:], int64[:], int64, "
-    "float64[:, :], float64[:], float64, float64"
-)
+@compiled(Tracks, "int64", Pose, DepthNoise)
 def _needing_fragments(
-    state: FloatArray,
-    extent_m: FloatArray,
-    moving: NDArray[np.bool_],
-    evidence: FloatArray,
-    fragments: NDArray[np.intp],
-    cells: NDArray[np.intp],
-    sightings: NDArray[np.intp],
-    seen_ns: NDArray[np.int64],
-    now_ns: int,
-    rotation: FloatArray,
-    camera_m: FloatArray,
-    floor_m: float,
-    quadratic_per_m: float,
+    tracks: Tracks, now_ns: int, camera: Pose, noise: DepthNoise
 ) -> tuple[NDArray[np.intp], FloatArray, FloatArray, NDArray[np.bool_]]:
-    """Indices of the tracks that need fragments, and their depth_m, gate_m and urgent.
-
-    rotation, camera_m: pose of the camera. floor_m, quadratic_per_m: depth noise.
-    """
-    chosen, depth_m, gate_m = np.empty(len(state), np.intp), np.empty(len(state)), np.empty(len(state))
-    urgent, count = np.empty(len(state), np.bool_), 0
-    for n in range(len(state)):
-        few = fragments[n] < (_ENOUGH_OF_A_MOVER if moving[n] else _FEW_FRAGMENTS)
-        if not few or seen_ns[n] != now_ns or cells[n] < MIN_CELLS:
+    """Indices of the tracks that need fragments, and their depth_m, gate_m and urgent."""
+    size = len(tracks.state)
+    chosen, depth_m, gate_m = np.empty(size, np.intp), np.empty(size), np.empty(size)
+    urgent, count = np.empty(size, np.bool_), 0
+    for n in range(size):
+        few = tracks.fragments[n] < (_ENOUGH_OF_A_MOVER if tracks.moving[n] else _FEW_FRAGMENTS)
+        if not few or tracks.seen_ns[n] != now_ns or tracks.cells[n] < MIN_CELLS:
             continue
-        x, y, z = state[n, 0] - camera_m[0], state[n, 1] - camera_m[1], state[n, 2] - camera_m[2]
+        x = tracks.state[n, 0] - camera.translation_m[0]
+        y = tracks.state[n, 1] - camera.translation_m[1]
+        z = tracks.state[n, 2] - camera.translation_m[2]
         if not x * x + y * y + z * z <= _REACH_M**2:
             continue
-        depth = max(x * rotation[0, 2] + y * rotation[1, 2] + z * rotation[2, 2], 0.0)
-        gate = _GATE_M + _GATE_SIGMAS * depth_sigma_of(depth, floor_m, quadratic_per_m)
-        gate += 0.5 * np.minimum(extent_m[n, 2], _DEEPEST_M)
+        depth = max(x * camera.rotation[0, 2] + y * camera.rotation[1, 2] + z * camera.rotation[2, 2], 0.0)
+        gate = _GATE_M + _GATE_SIGMAS * depth_sigma_of(depth, noise.floor_m, noise.quadratic_per_m)
+        gate += 0.5 * np.minimum(tracks.extent_m[n, 2], _DEEPEST_M)
         chosen[count], depth_m[count], gate_m[count] = n, depth, gate
-        urgent[count] = evidence[n] > 0.0 or sightings[n] < _URGENT_SIGHTINGS
+        urgent[count] = tracks.evidence[n] > 0.0 or tracks.sightings[n] < _URGENT_SIGHTINGS
         count += 1
     return chosen[:count], depth_m[:count], gate_m[:count], urgent[:count]
 
