@@ -12,10 +12,10 @@ import pytest
 from config.perception import PerceptionConfig
 from hal.types import GyroSamples
 from tests.support.painted import FRAME_NS, MOUNT, QVGA, box, drive, floor, record, vector, wall
-from vision import detector
 from vision.camera.gyro import GyroMemory
 from vision.camera.lens import vector_from_rotation
 from vision.detector import Detector
+from vision.ego_motion import motion_memory
 from vision.ego_motion.motion_prior import with_gyro
 
 MS = 1_000_000
@@ -129,7 +129,7 @@ def test_the_detector_knows_its_turn_from_samples_that_came_too_early(
         told.append(float(vector_from_rotation(prior.motion.rotation)[0]))
         return prior
 
-    monkeypatch.setattr(detector, "with_gyro", noted)
+    monkeypatch.setattr(motion_memory, "with_gyro", noted)
     crate = box(vector(3.5, 0.5, 0.0), vector(0.4, 0.6, 1.2), 10)
     frames, eyes = (
         record(floor() + wall() + crate, drive(), 6, QVGA).frames,
