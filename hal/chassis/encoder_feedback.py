@@ -99,7 +99,7 @@ class EncoderFeedback:
             self._expected_counts(elapsed_s),
             _STEP_SLACK_M * self._counts_per_m,
         )
-        # Asked first: after a restart near 0, the next counts may also go on from those before it.
+        # This outranks a plausible step: after a restart near 0, counts may go on from those before it, too.
         goes_on_from_suspect = suspect is not None and self._goes_on(suspect, counts)
         if steps is None and last is not None and not self._checksum and not goes_on_from_suspect:
             self._suspect = counts

@@ -101,8 +101,8 @@ class RoboclawPort:
             if too_late:
                 self._timed_out = request, self._sent_ns
             self._quiet_until_ns = now_ns + _SILENCE_NS
-        elif request.reply_lengths:
-            self.late_answer = ""
+        elif request.reply_lengths:  # Answers come in order: none of an earlier request is still to come.
+            self.late_answer, self._timed_out = "", None
         self._request = None
         return Answer(request, data, self._sent_ns)
 

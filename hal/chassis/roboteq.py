@@ -96,7 +96,7 @@ class RoboteqChassis(ChassisDriver):
                 self._feedback.note_reply(line is Reply.ACCEPTED)
             elif self._pending_query is not None and line.name == self._pending_query.name:
                 self._pending_query = None
-                self._late = ""
+                self._late, self._timed_out = "", None  # Answers come in order.
                 self._feedback.take(line.name, line.values, self._query_sent_ns, now_ns)
             else:  # An answer that came too late, or that was not asked for.
                 self._note_late(line.name, now_ns)

@@ -137,6 +137,16 @@ class TestPort:
         assert bytes(link.sent) == b"\x80\x4e\x80\x18"
         assert port.late_answer.startswith("the last answer came 80 ms after its request")
 
+    def test_no_answer_is_late_for_a_request_before_one_that_was_answered(self) -> None:
+        link, port = asked(packets.speeds(1, 1))
+        port.poll(40 * MS)
+        port.start(packets.MAIN_BATTERY_REQUEST, 60 * MS)
+        link.deliver(b"\x00\xfc" + crc(24, b"\x00\xfc"))
+        assert port.poll(80 * MS) is not None
+        link.deliver(b"\xff")
+        port.poll(5000 * MS)
+        assert port.late_answer == ""
+
     def test_noise_is_no_late_answer(self) -> None:
         link, port = asked(packets.ENCODERS_REQUEST)
         port.poll(40 * MS)
