@@ -221,3 +221,14 @@ def test_the_fastest_speed_holds_for_each_track() -> None:
 def test_nothing_is_known_before_the_second_counter_answer() -> None:
     bench = Bench()
     assert first_with_speed([bench.step() for _ in range(20)]) >= 3
+
+
+def test_silence_after_answers_in_time_is_not_told_as_late() -> None:
+    bench = Bench()
+    bench.arm()
+    bench.delay_answers(40)
+    bench.run(6)
+    bench.delay_answers(0)
+    assert bench.run(30).mode is ChassisMode.ARMED
+    bench.near.cut_wire()
+    assert bench.run(20).reason == "no motion feedback for 320 ms"
