@@ -2,6 +2,7 @@
 
 driver.py - what all drivers share: arming, a link that may be lost, checks of the command
 reading.py - reads all that has arrived on a serial link
+late_answer.py - the words for an answer that came too late
 command.py - checks and limits a setpoint before it is sent
 arming.py - the arming state machine
 following.py - checks that the base follows its commands

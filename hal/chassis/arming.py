@@ -44,6 +44,7 @@ class Evidence:
     standing: measured speed is zero; False when unknown.
     command_is_zero: the setpoint of this step asks for no motion.
     silence_hint: while no status or no motion feedback was ever heard, what came instead and what to check.
+    late_answer: how late the last answer came, if it came too late to be used.
     resettable: the base keeps stop_cause until arming resets it, so it prevents armed, but not arming.
     input_overflow: more was waiting than could be read, so what is known may be out of date.
     """
@@ -57,6 +58,7 @@ class Evidence:
     standing: bool
     command_is_zero: bool
     silence_hint: str = ""
+    late_answer: str = ""
     resettable: bool = False
     input_overflow: bool = False
 
@@ -203,5 +205,6 @@ def _loss(evidence: Evidence, limits: ArmingLimits) -> str:
         ("status", evidence.status_ns, limits.status_timeout_ns),
     ):
         if stamp_ns is not None and evidence.now_ns - stamp_ns > limit_ns:
-            return f"no {what} for {(evidence.now_ns - stamp_ns) / NS_PER_MS:.0f} ms"
+            silence = f"no {what} for {(evidence.now_ns - stamp_ns) / NS_PER_MS:.0f} ms"
+            return f"{silence}: {evidence.late_answer}" if evidence.late_answer else silence
     return ""

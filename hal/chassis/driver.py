@@ -174,6 +174,10 @@ class ChassisDriver(ABC):
         is unknown."""
         return ""
 
+    def _late_answer(self) -> str:
+        """How late the last answer came, if it came too late to be used; "" if it did not."""
+        return ""
+
     def _silence_hint(self) -> str:
         if self._reported.status_ns is None:
             return self._reported.silence_hint
@@ -228,7 +232,8 @@ class ChassisDriver(ABC):
             or self._following.sentence,
             standing=feedback.standing,
             command_is_zero=is_zero(self._requested),
-            silence_hint=self._silence_hint(),
+            silence_hint=self._late_answer() or self._silence_hint(),
+            late_answer=self._late_answer(),
             resettable=self._resettable(),
         )
 

@@ -1,8 +1,9 @@
 """Driver for a tracked base with one RoboClaw in packet serial mode, stepped by the control loop.
 
 The controller answers one request at a time, so motion commands and queries alternate: with a 50 Hz loop, a
-motion command is sent every 40 ms. A motion command whose answer is lost is not repeated; only settings are.
-The next motion command is newer, and is sent before any query. Queries have no checksum, and they reset the
+motion command is sent every 40 ms. A motion command whose answer is lost is not repeated: the next one is
+newer, and is sent before any query. A query with a garbled answer is repeated once, at once, by the port, and
+a setting without an answer again and again. Queries have no checksum, and they reset the
 controller's own time-out: a controller that takes queries but no commands would keep its speed while it is
 being queried.
 """
@@ -124,6 +125,9 @@ class RoboclawChassis(ChassisDriver):
         self._port.start(packets.speeds(0, 0), now_ns)
         self._port.abandon(now_ns)
         self._moving = False
+
+    def _late_answer(self) -> str:
+        return self._port.late_answer
 
     def _begin_arming(self) -> None:
         self._feedback.await_setup()

@@ -16,6 +16,7 @@ from hal.chassis import roboteq_lines as lines
 from hal.chassis.arming import ArmingLimits
 from hal.chassis.command import CommandLimits, due, is_zero
 from hal.chassis.driver import ChassisDriver
+from hal.chassis.late_answer import late_answer
 from hal.chassis.reading import read_all
 from hal.chassis.roboteq_feedback import RoboteqFeedback
 from hal.chassis.roboteq_lines import LineReader, Query, Reply
@@ -78,6 +79,8 @@ class RoboteqChassis(ChassisDriver):
         self._queries = cycle([lines.QUERIES[name] for other in _OTHER_QUERIES for name in (counters, other)])
         self._pending_query: Query | None = None
         self._query_sent_ns = 0
+        self._timed_out: tuple[str, int] | None = None
+        self._late = ""
         self._quiet_until_ns = 0
         self._setup = b""
         self._motion_sent_ns: int | None = None
@@ -93,14 +96,22 @@ class RoboteqChassis(ChassisDriver):
                 self._feedback.note_reply(line is Reply.ACCEPTED)
             elif self._pending_query is not None and line.name == self._pending_query.name:
                 self._pending_query = None
+                self._late, self._timed_out = "", None  # Answers come in order.
                 self._feedback.take(line.name, line.values, self._query_sent_ns, now_ns)
             else:  # An answer that came too late, or that was not asked for.
+                self._note_late(line.name, now_ns)
                 self._quiet_until_ns = max(self._quiet_until_ns, now_ns + _SILENCE_NS)
         if self._pending_query is not None and now_ns - self._query_sent_ns >= _REPLY_TIMEOUT_NS:
+            self._timed_out = self._pending_query.name, self._query_sent_ns
             self._pending_query = None
             self._reader.forget()
             self._quiet_until_ns = now_ns + _SILENCE_NS
         return bool(arrived)
+
+    def _note_late(self, name: str, now_ns: int) -> None:
+        """Keep how late it is if this is the answer to the query that timed out last."""
+        if self._timed_out is not None and self._timed_out[0] == name:
+            self._late = late_answer(now_ns - self._timed_out[1], _REPLY_TIMEOUT_NS)
 
     def _send(self, command: Setpoint, now_ns: int) -> Setpoint | None:
         stopping = self._moving and is_zero(command)
@@ -135,6 +146,9 @@ class RoboteqChassis(ChassisDriver):
         self._feedback.await_setup()
         watchdog = lines.set_watchdog(self._config.watchdog_ms)
         self._setup = lines.STOP + lines.ECHO_OFF + watchdog + lines.RELEASE
+
+    def _late_answer(self) -> str:
+        return self._late
 
     def _resettable(self) -> bool:
         # Only an emergency stop can be reset. A fault beside it must disappear by itself.

@@ -22,7 +22,7 @@ class RoboteqFeedback(EncoderFeedback):
 
     def __init__(self, config: RoboteqChassisConfig, geometry: TrackGeometry) -> None:
         signs = (config.left_sign, config.right_sign)
-        super().__init__(geometry, config.counts_per_m, signs, config.full_speed_mps)
+        super().__init__(geometry, config.counts_per_m, signs, config.full_speed_mps, checksum=False)
         self._config = config
         self._flags = 0
         self._flags_ns: int | None = None

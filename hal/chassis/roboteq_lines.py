@@ -3,7 +3,8 @@
 Source: Roboteq user manual V2.0 p. 172 (grammar), V1.8 pp. 253, 254, 286 (fault flags, motor flags, RWD).
 Every line ends with a carriage return. "+" accepts a command, "-" refuses one, and a query is answered by
 NAME=value:value. There is no checksum. A line counts only if all of it fits the grammar, so noise can still
-change a digit; the driver therefore rejects an encoder step that no track can make.
+change a digit; the driver therefore drops an encoder step that no track can make, and takes it for a restart
+if the next one goes on from there.
 """
 
 from __future__ import annotations

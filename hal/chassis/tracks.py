@@ -89,7 +89,7 @@ class TrackCounter:
         slack: float = math.inf,
     ) -> tuple[int, int] | None:
         """Counts since the last call; (0, 0) at the first call; None after a restart, from which counting
-        starts anew.
+        starts anew, unless start_at() says otherwise.
 
         limit: the largest plausible increment.
         expected: counts (left, right) at the speed measured before, NaN where unknown.
@@ -105,6 +105,10 @@ class TrackCounter:
         if self._restarted_from_zero(last, (left, right), expected, slack):
             return None
         return left_step, right_step
+
+    def start_at(self, left: int, right: int) -> None:
+        """Count the next increments from here."""
+        self._last = left, right
 
     def _restarted_from_zero(
         self, last: tuple[int, int], new: tuple[int, int], expected: tuple[float, float], slack: float

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from itertools import count
 from typing import Generic, TypeVar
@@ -36,14 +37,30 @@ class SerialBench(Generic[EmulatorT]):
         self.emulator = make_emulator(self.far, self.plant)
         self.chassis = make_chassis(self.near)
         self.now_ns = 0
+        self._delay_ns = 0
+        self._held_back: deque[tuple[int, bytes]] = deque()
+
+    def delay_answers(self, delay_ms: int) -> None:
+        """From now on, what the emulator says reaches the driver this much later."""
+        self._delay_ns = delay_ms * MS
+        self.far.peer = None
+        self.far.written.clear()
 
     def step(self, v_mps: float | None = None, w_radps: float = 0.0, after_ms: int = 20) -> ChassisState:
         """Emulator, then driver; near.written is what this exchange wrote."""
         self.now_ns += after_ms * MS
         self.emulator.advance_to(self.now_ns)
+        self._deliver_held_back()
         self.near.written.clear()
         command = None if v_mps is None else Setpoint(self.now_ns, v_mps, 0.0, w_radps)
         return self.chassis.exchange(command, self.now_ns)
+
+    def _deliver_held_back(self) -> None:
+        if self.far.peer is None:
+            self._held_back += [(self.now_ns + self._delay_ns, data) for data in self.far.written]
+            self.far.written.clear()
+        while self._held_back and self._held_back[0][0] <= self.now_ns:
+            self.near.deliver(self._held_back.popleft()[1])
 
     def run(self, steps: int, v_mps: float | None = None, w_radps: float = 0.0) -> ChassisState:
         """Many periods."""

@@ -115,6 +115,11 @@ def test_arming_gives_up_and_says_what_was_missing() -> None:
         ({"link_error": "unplugged"}, ChassisMode.LOST, "unplugged"),
         ({"feedback_ns": 39 * MS}, ChassisMode.LOST, "no motion feedback for 201 ms"),
         ({"status_ns": -461 * MS}, ChassisMode.LOST, "no status for 701 ms"),
+        (
+            {"feedback_ns": 39 * MS, "late_answer": "60 ms late"},
+            ChassisMode.LOST,
+            "no motion feedback for 201 ms: 60 ms late",
+        ),
     ],
 )
 def test_every_fault_latches_while_armed(changes: dict[str, object], mode: ChassisMode, reason: str) -> None:

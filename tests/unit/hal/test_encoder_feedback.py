@@ -15,8 +15,8 @@ STEP_NS = 100_000_000
 class Answers(EncoderFeedback):
     """Counters that answer every 0.1 s; the right one counts down when its track goes ahead."""
 
-    def __init__(self) -> None:
-        super().__init__(TrackGeometry(0.5, 1.0), 1000.0, (1, -1), max_track_mps=0.8)
+    def __init__(self, *, checksum: bool = True) -> None:
+        super().__init__(TrackGeometry(0.5, 1.0), 1000.0, (1, -1), max_track_mps=0.8, checksum=checksum)
         self.now_ns = 0
 
     def answer(self, left: int, right: int, after_ns: int = STEP_NS) -> None:
@@ -63,9 +63,9 @@ def test_turning_on_the_spot_is_not_standing() -> None:
     assert not told.standing
 
 
-def counted(*counts: int) -> Answers:
+def counted(*counts: int, checksum: bool = True) -> Answers:
     """Both tracks ahead alike, every 0.1 s."""
-    told = Answers()
+    told = Answers(checksum=checksum)
     for count in counts:
         told.answer(count, -count)
     return told
@@ -115,3 +115,43 @@ def test_one_track_alone_at_zero_is_no_restart() -> None:
     for left, right in ((0, 0), (10, 0), (40, 20), (25, 50)):
         told.answer(left, -right)
     assert math.isfinite(told.v_mps)
+
+
+@pytest.mark.parametrize("wrong", [9_140, -140, 100_140, 0])
+def test_without_a_checksum_a_single_jump_is_dropped(wrong: int) -> None:
+    told = counted(50, 90, 130, checksum=False)
+    heard_ns, v_mps = told.feedback_ns, told.v_mps
+    told.answer(wrong, -wrong)
+    assert (told.feedback_ns, told.v_mps) == (heard_ns, v_mps), "as if no answer had come"
+    assert told.pose.x_m == pytest.approx(0.08)
+    told.answer(210, -210)
+    assert told.v_mps == pytest.approx(0.4), "over the whole time since the last one that was believed"
+    assert told.pose.x_m == pytest.approx(0.16)
+    assert told.feedback_ns == told.now_ns
+
+
+@pytest.mark.parametrize(
+    "counts",
+    [
+        (500, 540, 580, 0, 0),
+        (500, 540, 580, 0, 30),
+        (500, 540, 580, 9000, 9040),
+        (0, 5, 12, 0, 14),  # near 0, where the last one goes on from those before the restart, too
+        (500, 540, 580, 9000, 0, 20),  # a wrong digit, then a restart
+    ],
+)
+def test_without_a_checksum_a_jump_that_stays_is_a_restart(counts: tuple[int, ...]) -> None:
+    told = counted(*counts[:-1], checksum=False)
+    x_m = told.pose.x_m
+    assert math.isfinite(told.v_mps)
+    told.answer(counts[-1], -counts[-1])
+    assert math.isnan(told.v_mps)
+    assert told.pose.x_m == x_m
+    told.answer(counts[-1] + 20, -counts[-1] - 20)
+    assert told.v_mps == pytest.approx(0.2), "counting starts anew there"
+
+
+def test_without_a_checksum_two_wrong_digits_are_no_restart() -> None:
+    told = counted(0, 40, 80, 9120, 5160, 200, checksum=False)
+    assert told.v_mps == pytest.approx(0.4)
+    assert told.pose.x_m == pytest.approx(0.2)

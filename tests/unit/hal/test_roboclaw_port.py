@@ -60,13 +60,47 @@ class TestPort:
     def test_noise_before_an_answer_spoils_it(self, noise: bytes) -> None:
         """An answer has no start mark: guessing where it begins would accept wrong checksums."""
         link, port = asked(packets.MAIN_BATTERY_REQUEST)
-        link.deliver(noise + b"\x00\xfc" + crc(24, b"\x00\xfc"))
-        assert port.poll(2 * MS) == Answer(packets.MAIN_BATTERY_REQUEST, None, 0)
+        for now_ms in (2, 4):
+            link.deliver(noise + b"\x00\xfc" + crc(24, b"\x00\xfc"))
+            answer = port.poll(now_ms * MS)
+        assert answer == Answer(packets.MAIN_BATTERY_REQUEST, None, 2 * MS)
 
     def test_a_wrong_checksum_is_no_answer(self) -> None:
         link, port = asked(packets.MAIN_BATTERY_REQUEST)
+        for now_ms in (2, 4):
+            link.deliver(b"\x00\xfd" + crc(24, b"\x00\xfc"))
+            answer = port.poll(now_ms * MS)
+        assert answer == Answer(packets.MAIN_BATTERY_REQUEST, None, 2 * MS)
+
+    def test_a_garbled_answer_is_asked_for_again_at_once_and_once(self) -> None:
+        link, port = asked(packets.MAIN_BATTERY_REQUEST)
         link.deliver(b"\x00\xfd" + crc(24, b"\x00\xfc"))
-        assert port.poll(2 * MS) == Answer(packets.MAIN_BATTERY_REQUEST, None, 0)
+        assert port.poll(20 * MS) is None
+        assert bytes(link.sent) == b"\x80\x18" * 2
+        link.deliver(b"\x00\xfb" + crc(24, b"\x00\xfb"))
+        assert port.poll(40 * MS) == Answer(packets.MAIN_BATTERY_REQUEST, b"\x00\xfb", 20 * MS)
+        port.start(packets.CURRENTS_REQUEST, 40 * MS)
+        for now_ms in (60, 80):
+            link.deliver(bytes(6))
+            answer = port.poll(now_ms * MS)
+        assert answer == Answer(packets.CURRENTS_REQUEST, None, 60 * MS)
+        assert bytes(link.sent[4:]) == b"\x80\x31" * 2
+        assert not port.idle(89 * MS), "now the line is left quiet"
+
+    @pytest.mark.parametrize("data", [b"", b"\x00", b"\x00\xfc\x12"])
+    def test_a_missing_answer_is_not_asked_for_again(self, data: bytes) -> None:
+        """If it came late, it would be taken for the second answer, and its data for newer than they are."""
+        link, port = asked(packets.MAIN_BATTERY_REQUEST)
+        link.deliver(data)
+        assert port.poll(20 * MS) is None
+        assert port.poll(40 * MS) == Answer(packets.MAIN_BATTERY_REQUEST, None, 0)
+        assert bytes(link.sent) == b"\x80\x18"
+
+    def test_a_garbled_acknowledgement_ends_its_request(self) -> None:
+        link, port = asked(packets.speeds(1, 1))
+        link.deliver(b"\xfe")
+        assert port.poll(20 * MS) == Answer(packets.speeds(1, 1), None, 0)
+        assert len(link.written) == 1, "the next motion command is newer"
 
     def test_an_answer_that_comes_too_late_is_not_taken_for_the_next(self) -> None:
         link, port = asked(packets.speeds(1, 1))
@@ -78,6 +112,47 @@ class TestPort:
         assert port.idle(48 * MS)
         port.start(packets.speeds(2, 2), 48 * MS)
         assert port.poll(50 * MS) is None
+
+    def test_how_late_an_answer_comes_is_told_until_one_is_in_time(self) -> None:
+        link, port = asked(packets.MAIN_BATTERY_REQUEST)
+        battery = b"\x00\xfc" + crc(24, b"\x00\xfc")
+        port.poll(40 * MS)
+        assert port.late_answer == "", "nothing came"
+        link.deliver(battery)
+        port.poll(60 * MS)
+        late = "the last answer came 60 ms after its request, too late: the limit is 30 ms"
+        assert port.late_answer == late
+        port.start(packets.MAIN_BATTERY_REQUEST, 80 * MS)
+        link.deliver(battery)
+        assert port.poll(100 * MS) is not None
+        assert port.late_answer == ""
+
+    def test_a_late_answer_that_comes_in_the_place_of_the_next_is_no_reason_to_ask_again(self) -> None:
+        link, port = asked(packets.ENCODERS_REQUEST)
+        port.poll(40 * MS)
+        port.start(packets.MAIN_BATTERY_REQUEST, 60 * MS)
+        data = struct.pack(">II", 1, 2)
+        link.deliver(data + crc(78, data))
+        assert port.poll(80 * MS) == Answer(packets.MAIN_BATTERY_REQUEST, None, 60 * MS)
+        assert bytes(link.sent) == b"\x80\x4e\x80\x18"
+        assert port.late_answer.startswith("the last answer came 80 ms after its request")
+
+    def test_no_answer_is_late_for_a_request_before_one_that_was_answered(self) -> None:
+        link, port = asked(packets.speeds(1, 1))
+        port.poll(40 * MS)
+        port.start(packets.MAIN_BATTERY_REQUEST, 60 * MS)
+        link.deliver(b"\x00\xfc" + crc(24, b"\x00\xfc"))
+        assert port.poll(80 * MS) is not None
+        link.deliver(b"\xff")
+        port.poll(5000 * MS)
+        assert port.late_answer == ""
+
+    def test_noise_is_no_late_answer(self) -> None:
+        link, port = asked(packets.ENCODERS_REQUEST)
+        port.poll(40 * MS)
+        link.deliver(bytes(10))
+        port.poll(60 * MS)
+        assert port.late_answer == ""
 
     def test_an_abandoned_request_leaves_room_for_its_answer(self) -> None:
         link, port = asked(packets.speeds(1, 1))

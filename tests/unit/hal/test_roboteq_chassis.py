@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
+from itertools import cycle, pairwise
 
 import pytest
 
 from hal.types import ChassisMode
+from tests.support.chassis_rig import MS
 from tests.support.roboteq_bench import Bench
 from tests.support.serial_bench import every, first_with_speed
 
@@ -148,14 +149,53 @@ def test_echo_is_no_answer() -> None:
     assert bench.run(100, 0.5).v_mps == pytest.approx(0.5, abs=0.005)
 
 
-def test_a_counter_that_noise_made_is_not_believed() -> None:
+def test_a_counter_that_noise_made_is_dropped_like_a_lost_answer() -> None:
+    """One wrong digit in every third answer of the counters."""
+    bench = Bench()
+    bench.arm()
+    bench.run(50, 0.5)
+    spoil = every(3, lambda line: line.replace(b"C=", b"C=9"))
+    bench.near.set_filter(lambda data: spoil(data) if b"C=" in data else data)
+    states = [bench.step(0.5) for _ in range(100)]
+    assert {state.mode for state in states} == {ChassisMode.ARMED}
+    assert all(state.v_mps == pytest.approx(0.5, abs=0.01) for state in states)
+    assert states[-1].pose.x_m == pytest.approx(bench.plant.pose.x_m, abs=0.02)
+    assert max(s.stamp_ns - s.feedback_ns for s in states if s.feedback_ns is not None) <= 100 * MS
+
+
+def test_a_counter_that_jumps_and_stays_there_is_a_restart_within_two_answers() -> None:
     bench = Bench()
     bench.arm()
     bench.run(50, 0.5)
     bench.near.set_filter(lambda data: data.replace(b"C=", b"C=9"))
-    state = bench.run(4, 0.5)
-    assert state.mode is ChassisMode.ESTOP
+    state = bench.run(5, 0.5)
+    assert state.reason.startswith("the base no longer obeys: its counters jumped: restarted")
     assert state.pose.x_m < 1.0
+
+
+def test_counters_that_are_never_plausible_end_the_drive_as_silence_does() -> None:
+    bench = Bench()
+    bench.arm()
+    bench.run(50, 0.5)
+    noise = cycle((b"C=9", b"C=-7", b"C=5"))
+    bench.near.set_filter(lambda data: data.replace(b"C=", next(noise)) if b"C=" in data else data)
+    state = bench.run(17, 0.5)
+    assert (state.mode, state.reason) == (ChassisMode.LOST, "no motion feedback for 320 ms")
+    assert state.pose.x_m < 1.2
+
+
+@pytest.mark.parametrize(("delay_ms", "told_ms"), [(40, 60), (60, 80)])
+def test_answers_that_come_too_late_are_told_so(delay_ms: int, told_ms: int) -> None:
+    late = f"the last answer came {told_ms} ms after its request, too late: the limit is 40 ms"
+    bench = Bench()
+    bench.arm()
+    bench.delay_answers(delay_ms)
+    state = bench.run(40)
+    assert (state.mode, state.reason) == (ChassisMode.LOST, f"no motion feedback for 320 ms: {late}")
+    unheard = Bench()
+    unheard.delay_answers(delay_ms)
+    unheard.chassis.arm(0)
+    assert unheard.run(160).reason == f"arming gave up after 3.0 s: no status heard from the base: {late}"
 
 
 def test_mirrored_motors_drive_and_count_the_other_way() -> None:
@@ -181,3 +221,14 @@ def test_the_fastest_speed_holds_for_each_track() -> None:
 def test_nothing_is_known_before_the_second_counter_answer() -> None:
     bench = Bench()
     assert first_with_speed([bench.step() for _ in range(20)]) >= 3
+
+
+def test_silence_after_answers_in_time_is_not_told_as_late() -> None:
+    bench = Bench()
+    bench.arm()
+    bench.delay_answers(40)
+    bench.run(6)
+    bench.delay_answers(0)
+    assert bench.run(30).mode is ChassisMode.ARMED
+    bench.near.cut_wire()
+    assert bench.run(20).reason == "no motion feedback for 320 ms"
