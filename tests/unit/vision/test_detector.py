@@ -5,13 +5,17 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
 
 from config.perception import FragmentSettings, PerceptionConfig
-from hal.types import PlanarPose
+from hal.types import PlanarPose, RgbdFrame
 from tests.support.painted import FRAME_NS, MOUNT, QVGA, Take, box, drive, floor, plain, record, vector, wall
+from vision.fragments.attention import Attention
+from vision.fragments.candidates import NOTHING_NEW, NewFragments
+from vision.fragments.renewal import Renewal
 from vision.perception import Perception
 from vision.scene import Fragments
 
@@ -109,3 +113,25 @@ def test_velocity_of_a_fragment_is_unknown_before_it_is_measured() -> None:
     sigma = seen[-1].velocity_sigma_mps
     np.testing.assert_array_equal(np.isnan(sigma), np.isnan(later))
     assert np.nanmin(sigma) > 0.0
+
+
+@pytest.mark.parametrize(("looks", "renewals"), [(True, COUNT // 2), (False, COUNT)])
+def test_look_at_a_body_takes_the_place_of_every_second_renewal(
+    looks: bool, renewals: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where bodies wait for a look in every frame, the camera's motion needs new fragments all the same."""
+    renewed: list[int] = []
+    find = Renewal.find
+
+    def noted(self: Renewal, frame: RgbdFrame, *rest: Any) -> NewFragments:
+        renewed.append(frame.sequence)
+        return find(self, frame, *rest)
+
+    def looked(*_: object) -> NewFragments | None:
+        return NOTHING_NEW if looks else None
+
+    monkeypatch.setattr(Renewal, "find", noted)
+    monkeypatch.setattr(Attention, "find", looked)
+    watch(ahead())
+    assert len(renewed) == pytest.approx(renewals, abs=1)
+    assert looks == (max(np.diff(renewed)) == 2)
