@@ -31,6 +31,7 @@ Chassis drivers with their emulators and links:
 * wires.py - links with a plug to pull, and a pseudo-terminal that keeps pace with simulated time
 * serial_bench.py - a serial driver and its emulator on a wire in memory
 * kobuki_bench.py - the same for a Kobuki
+* roboclaw_bench.py - the same for a RoboClaw
 * roboteq_bench.py - the same for a Roboteq
 * agilex_bench.py - the AgileX driver alone, fed frame by frame
 * chassis_rig.py - any driver and its emulator, stepped together in simulated time
