@@ -21,11 +21,12 @@ class OutputIsolation:
 
     def __init__(self, cut_off: Callable[[str], None] | None = None) -> None:
         self._cut_off = cut_off
-        self._ended: set[int] = set()
+        # The outputs themselves, so that none that is opened later can be taken for one of them.
+        self._ended: list[object] = []
 
     def is_active(self, output: object) -> bool:
         """Whether the output exists and has not failed."""
-        return output is not None and id(output) not in self._ended
+        return output is not None and not any(output is ended for ended in self._ended)
 
     @contextmanager
     def guard(self, output: object) -> Iterator[None]:
@@ -36,7 +37,7 @@ class OutputIsolation:
             if self._cut_off is None:
                 raise
             if self.is_active(output):
-                self._ended.add(id(output))
+                self._ended.append(output)
                 self._cut_off(str(failure))
 
     @contextmanager

@@ -273,12 +273,12 @@ def test_nothing_is_learned_of_the_floor_from_a_camera_that_cannot_be_trusted() 
 def test_body_out_of_view_is_remembered_through_every_new_arc() -> None:
     """Somebody slower beside the way is overtaken; out of view he may step in for 2 s at least."""
     drive = GovernedDrive(always(0.8), [Box(walking(4.5, 1.9, 0.35, -0.02))])
-    arcs, remembered = set(), []
+    arcs, remembered = {}, []  # kept alive: a new object may have the identity of a dead one
     for step in itertools.count():
         drive.step()
         known = drive.governor._ahead.known
         assert known is not None
-        arcs.add(id(drive.governor.path))
+        arcs[id(drive.governor.path)] = drive.governor.path
         remembered.append(len(known._out_of_view._bodies))
         if step > 14.0 / PERIOD_S:
             break
