@@ -36,10 +36,9 @@ from typing import Any, ParamSpec, TypeVar
 import numpy as np
 from numba import njit, types
 from numba.core import caching, sigutils
-from numba.core.dispatcher import Dispatcher
 from numba.core.errors import NumbaError
 
-from hal.step_records import fields_read, from_fields, from_records, parameters_of
+from hal.step_records import fields_read, from_fields, from_records, parameters_of, parts_of
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -118,7 +117,9 @@ def _compile(function: Callable[P, R], signature: tuple[types.Type, ...]) -> Cal
 
 def inlined(function: Callable[P, R]) -> Callable[P, R]:
     """Decorator for a function that compiled steps call, compiled for the types they pass."""
-    result: Callable[P, R] = njit(error_model="numpy")(function)
+    part: Any = njit(error_model="numpy")(function)
+    part.py_func = function  # so it is already, but not with NUMBA_DISABLE_JIT=1; parts_of() needs it
+    result: Callable[P, R] = part
     return result
 
 
@@ -148,29 +149,27 @@ class _Cache(caching.FunctionCache):  # type: ignore[misc]  # Numba has no types
 
     def __init__(self, function: FunctionType) -> None:
         super().__init__(function)
-        stamp = self._impl.locator.get_source_stamp(), *_rests_on(function, set())
+        stamp = self._impl.locator.get_source_stamp(), *_rests_on(function)
         self._cache_file = caching.IndexDataCacheFile(self.cache_path, self._impl.filename_base, stamp)
 
 
-def _rests_on(function: FunctionType, known: set[FunctionType]) -> Iterator[object]:
+def _rests_on(function: FunctionType) -> Iterator[object]:
     """What the compiled form of function depends on besides its own file.
 
     Yields the hashes of the files of the parts that it calls, and the constants and fields of records that
-    they and it read. known: the parts that were visited already.
+    they and it read.
     """
-    for name in function.__code__.co_names:
-        value = function.__globals__.get(name)
-        if isinstance(value, Dispatcher):
-            if value.py_func not in known:
-                known.add(value.py_func)
-                yield sha256(Path(inspect.getfile(value.py_func)).read_bytes()).hexdigest()
-                yield from _rests_on(value.py_func, known)
-        elif isinstance(value, np.ndarray):
-            yield name, value.tobytes()
-        elif isinstance(value, type) and issubclass(value, tuple):
-            yield name, getattr(value, "_fields", ())
-        elif isinstance(value, _CONSTANTS):
-            yield name, repr(value)
+    for part in parts_of(function):
+        if part is not function:
+            yield sha256(Path(inspect.getfile(part)).read_bytes()).hexdigest()
+        for name in part.__code__.co_names:
+            value = part.__globals__.get(name)
+            if isinstance(value, np.ndarray):
+                yield name, value.tobytes()
+            elif isinstance(value, type) and issubclass(value, tuple):
+                yield name, getattr(value, "_fields", ())
+            elif isinstance(value, _CONSTANTS):
+                yield name, repr(value)
 
 
 def _say(sentence: str, *values: str) -> None:

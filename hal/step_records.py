@@ -7,22 +7,23 @@ which is a record, and now_ns, two functions are made:
 
     from_records: _listed(tracks, now_ns) calls the second with (tracks.state, tracks.moving, now_ns)
     from_fields: _listed(tracks_state, tracks_moving, now_ns) calls the step; this one is compiled
+
+A step is given the fields whose names occur in its code or in that of the parts it calls. A name that means
+something else there, or the field of another record, adds an array that nobody reads, 0.08 us a call.
 """
 
 from __future__ import annotations
 
-import dis
 from collections import namedtuple
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from itertools import pairwise
-from types import CodeType
+from collections.abc import Callable, Mapping, Sequence
+from types import CodeType, FunctionType
 from typing import Any, get_type_hints
 
 Function = Callable[..., Any]
 # The fields that a step reads, for each of its parameters that is a record.
 Fields = Mapping[str, Sequence[str]]
 
-_NUMBERS = {float: "float64", int: "int64", bool: "boolean"}
+_NUMBERS: dict[object, str] = {float: "float64", int: "int64", bool: "boolean"}
 
 
 def parameters_of(function: Function) -> tuple[str, ...]:
@@ -32,20 +33,37 @@ def parameters_of(function: Function) -> tuple[str, ...]:
 
 
 def fields_read(function: Function, parameter: str, record: type) -> dict[str, str]:
-    """The fields that function reads of a parameter that is a record, with their types in Numba's notation.
+    """The fields that function may read of a parameter that is a record, with their types for Numba.
 
-    If function hands the record on, these are all fields that have a type: numbers, and arrays declared with
-    the types of hal/types.py. Raises TypeError if function reads a field without a type, or no field.
+    Numbers have a type, and arrays that are declared with the types of hal/types.py. Raises TypeError if
+    function reads a field without a type, or no field.
     """
-    typed, read = dict(_typed(record)), set(_read(_code(function), parameter))
-    if None in read:
-        read = set(typed)
-    if not read or read - set(typed):
-        what = ", ".join(map(str, read - set(typed))) or "no field"
+    hints = get_type_hints(record, include_extras=True)
+    named = {name for part in parts_of(function) for name in part.__code__.co_names}
+    read = {name: _type_of(hint) for name, hint in hints.items() if name in named}
+    typed = {name: kind for name, kind in read.items() if kind is not None}
+    if not typed or len(typed) < len(read):
+        what = ", ".join(read.keys() - typed.keys()) or "no field"
         raise TypeError(
             f"{function.__qualname__} reads {what} of {parameter}: {record.__name__} declares no type for it"
         )
-    return {name: kind for name, kind in typed.items() if name in read}
+    return typed
+
+
+def parts_of(function: Function) -> list[FunctionType]:
+    """function and the inlined parts that it calls, directly or by way of another part, each once."""
+    found: list[FunctionType] = []
+
+    def visit(part: Any) -> None:
+        if part not in found:
+            found.append(part)
+            for name in part.__code__.co_names:
+                called = part.__globals__.get(name)
+                if hasattr(called, "py_func"):
+                    visit(called.py_func)
+
+    visit(function)
+    return found
 
 
 def from_records(step: Function, function: Function, fields: Fields) -> Function:
@@ -72,25 +90,11 @@ def _code(function: Function) -> CodeType:
     return code
 
 
-def _typed(record: type) -> Iterator[tuple[str, str]]:
-    """The public fields of a record that have a compiled type, with it."""
-    for name, kind in get_type_hints(record, include_extras=True).items():
-        if name.startswith("_"):
-            continue
-        if kind in _NUMBERS:
-            yield name, _NUMBERS[kind]
-        elif hasattr(kind, "__metadata__"):  # Annotated
-            yield name, kind.__metadata__[0]
-
-
-def _read(code: CodeType, parameter: str) -> Iterator[str | None]:
-    """The fields that code reads of a parameter; None where it hands on the parameter as a whole."""
-    for load, following in pairwise(dis.get_instructions(code)):
-        # From Python 3.13 on, one instruction may load two variables, or store one and load the next.
-        loaded = load.argval if isinstance(load.argval, tuple) else (load.argval,)
-        if "LOAD_FAST" in load.opname and parameter in loaded:
-            is_read = following.opname == "LOAD_ATTR" and loaded[-1] == parameter
-            yield following.argval if is_read else None
+def _type_of(hint: object) -> str | None:
+    """The compiled type of a field that is declared with hint; None if it has none."""
+    if hasattr(hint, "__metadata__"):  # Annotated
+        return str(hint.__metadata__[0])
+    return _NUMBERS.get(hint)
 
 
 def _parts(name: str, fields: Fields, joint: str) -> list[str]:
