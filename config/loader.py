@@ -31,6 +31,25 @@ _IN_OTHER_WORDS = {
 }
 
 
+# Errors of a number outside its bounds, and units by the ending of a key: a wrong unit is the usual cause.
+_BOUNDS = frozenset({"less_than", "less_than_equal", "greater_than", "greater_than_equal"})
+_UNITS = {
+    "m": "m",
+    "s": "s",
+    "ms": "ms",
+    "px": "pixels",
+    "deg": "degrees",
+    "rad": "rad",
+    "hz": "Hz",
+    "v": "V",
+    "mps": "m/s",
+    "mps2": "m/s^2",
+    "mps3": "m/s^3",
+    "radps": "rad/s",
+    "degps": "degrees/s",
+}
+
+
 class ConfigError(Exception):
     """A YAML file is missing, is not YAML, or says something unknown, wrong or impossible."""
 
@@ -163,6 +182,8 @@ def describe(error: ValidationError, model: type[BaseModel], content: object = N
             found = detail["input"]
             shown = str(found) if isinstance(found, date) else repr(found)
             reason = f"{reason}, found {shown}" + _what_to_write(detail)
+            if detail["type"] in _BOUNDS and (unit := _unit_of(key)):
+                reason += f" {unit}"
         parts.append(f"{key}: {reason}" if key else reason)
     if len(parts) > _MOST_MISTAKES:
         parts[_MOST_MISTAKES:] = [f"and {len(parts) - _MOST_MISTAKES} more mistakes"]
@@ -173,6 +194,11 @@ def _is_in(inner: ErrorDetails, outer: ErrorDetails) -> bool:
     """Whether inner is a mistake in a part of what outer is about."""
     place = outer["loc"]
     return len(inner["loc"]) > len(place) and inner["loc"][: len(place)] == place
+
+
+def _unit_of(key: str) -> str:
+    """The unit that the name of a key ends with, in words; "" if there is none."""
+    return _UNITS.get(key.partition(" ")[0].rpartition("_")[2], "")
 
 
 def _what_to_write(detail: ErrorDetails) -> str:

@@ -25,8 +25,11 @@ step's own file.
 from __future__ import annotations
 
 import inspect
+import signal
 import sys
+import threading
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from hashlib import sha256
 from pathlib import Path
 from pickle import PickleError
@@ -136,12 +139,29 @@ def _build(
             step._cache = _Cache(step.py_func)  # as Dispatcher.enable_caching does
         if anew:
             step.recompile()  # nothing is compiled yet, but this drops the cached form
-        step.compile(signature)
+        with _interrupts_deferred():
+            step.compile(signature)
         step.disable_compile()
         if kept and step.stats.cache_misses:
             _say(_FIRST_TIME)
     result: Callable[P, R] = step
     return result
+
+
+@contextmanager
+def _interrupts_deferred() -> Iterator[None]:
+    """Hold back Ctrl-C until the block ends: the compiler calls Python from C, where an exception is lost."""
+    if threading.current_thread() is not threading.main_thread():
+        yield  # only the main thread is interrupted, and only there may handlers be set
+        return
+    held_back: list[int] = []
+    before = signal.signal(signal.SIGINT, lambda number, _frame: held_back.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+        if held_back:
+            signal.raise_signal(signal.SIGINT)
 
 
 class _Cache(caching.FunctionCache):  # type: ignore[misc]  # Numba has no types

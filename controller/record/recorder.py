@@ -125,7 +125,7 @@ class Recorder:
 def require_two_files(observations: FilePath | None, video: FilePath | None) -> None:
     """Raise UserError if both name the same file: each would overwrite the other."""
     if observations is not None and video is not None and realpath(observations) == realpath(video):
-        raise UserError(f"{observations}: is to hold the observations and the video; name two files")
+        raise UserError(f"{observations}: cannot hold both the observations and the video; name two files")
 
 
 def require_writable(options: RecordingOptions) -> None:

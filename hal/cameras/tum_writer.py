@@ -20,6 +20,8 @@ from hal.types import CameraMount, Pose, RgbdFrame
 
 # zlib's fastest level: a third of the time of the default level, for 10 % more bytes.
 _PNG_FAST = (cv2.IMWRITE_PNG_COMPRESSION, 1)
+# Any of them makes a folder a recording. One that is left of another recording would pass for a part of this.
+_OWN_FILES = ("rgb.txt", "depth.txt", "camera.yaml", "odometry.txt", "groundtruth.txt")
 
 
 class _AppendFile:
@@ -67,8 +69,12 @@ class TumWriter:
 
     def prepare(self) -> None:
         """Make the folders. Raises DeviceRefused if that fails or if there is a recording already."""
-        if os.path.exists(self._folder / "rgb.txt"):
-            raise DeviceRefused(f"{self._folder}: holds a recording already; choose another folder")
+        for name in _OWN_FILES:
+            if os.path.exists(self._folder / name):
+                raise DeviceRefused(
+                    f"{self._folder}: holds a recording already, or a part of one ({name}); "
+                    "choose another folder"
+                )
         for name in ("rgb", "depth"):
             with self._refusing(name):
                 (self._folder / name).mkdir(parents=True, exist_ok=True)

@@ -83,7 +83,11 @@ def _hal_error(error: Exception, config: SerialLinkConfig) -> HalError:
         )
     # pyserial drops the number when the file is there but does not take a port's settings.
     if isinstance(error.__context__, termios.error) or error_number not in (None, errno.ENOENT):
-        return DeviceRefused(f"{where}: is not a serial port that takes {config.baud} baud ({reason(error)})")
+        cause = reason(error) if error_number is None else os.strerror(error_number)
+        return DeviceRefused(
+            f"{where}: is not a serial port that takes {config.baud} baud ({cause}); check url and baud "
+            f"({_describe_ports(_DEVICES)})"
+        )
     # pyserial's own text repeats the name of the port, and the meaning of the error number.
     cause = (
         reason(error).rpartition(f"{config.url}: ")[2] if error_number is None else os.strerror(error_number)

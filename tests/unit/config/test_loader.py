@@ -102,6 +102,12 @@ def test_wrong_content_is_refused_in_one_line(tmp_path: Path, text: str, reason:
     assert reason in refusal(tmp_path, text)
 
 
+def test_number_outside_its_bounds_is_told_with_its_unit(tmp_path: Path) -> None:
+    assert "speed_mps: Input should be greater than 0, found -2 m/s" in refusal(
+        tmp_path, "count: 1\ninner: {speed_mps: -2}"
+    )
+
+
 def test_a_missing_file_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"none\.yaml: cannot be read \(No such file"):
         load(tmp_path / "none.yaml", Outer)

@@ -7,6 +7,7 @@ import inspect
 import os
 import pkgutil
 import resource
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -188,6 +189,28 @@ def test_an_error_in_a_step_is_told_when_its_module_is_imported() -> None:
 
     with pytest.raises(Exception, match="No implementation of function"):
         compiled("float64")(wrong)
+
+
+def test_ctrl_c_waits_until_the_step_is_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
+    finish, finished = Dispatcher.compile, []
+
+    def interrupted(step: Dispatcher, signature: object) -> None:
+        signal.raise_signal(signal.SIGINT)
+        finish(step, signature)
+        finished.append(step)
+
+    def twice(value: float) -> float:
+        return 2.0 * value
+
+    monkeypatch.setattr(Dispatcher, "compile", interrupted)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            compiled("float64")(twice)
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert len(finished) == 1
 
 
 def test_without_the_compiler_it_is_plain_python() -> None:

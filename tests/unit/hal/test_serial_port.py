@@ -60,8 +60,14 @@ def test_a_port_that_is_not_there_is_one_clear_line(url: str, reason: str, advic
 def test_a_file_that_is_no_port_is_refused(tmp_path: Path) -> None:
     plain = tmp_path / "plain"
     plain.write_bytes(b"")
-    with pytest.raises(DeviceRefused, match="is not a serial port"):
+    with pytest.raises(DeviceRefused, match=r"is not a serial port .*; check url and baud"):
         open_serial_link(config(str(plain)))
+
+
+def test_a_folder_in_place_of_a_port_is_named_once(tmp_path: Path) -> None:
+    with pytest.raises(DeviceRefused, match=r"baud \(Is a directory\); check url and baud") as caught:
+        open_serial_link(config(str(tmp_path)))
+    assert str(caught.value).count(str(tmp_path)) == 1
 
 
 def test_a_port_in_use_is_refused() -> None:

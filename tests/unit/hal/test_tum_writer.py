@@ -65,19 +65,26 @@ def test_a_folder_that_holds_a_recording_is_not_overwritten(tmp_path: Path) -> N
         TumWriter(tmp_path).__enter__()
 
 
+@pytest.mark.parametrize("name", ["camera.yaml", "odometry.txt", "groundtruth.txt"])
+def test_a_file_that_would_pass_for_a_part_of_the_recording_is_left_alone(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_text("of another recording")
+    with pytest.raises(DeviceRefused, match=rf"a part of one \({name}\); choose another folder"):
+        TumWriter(tmp_path).prepare()
+    assert (tmp_path / name).read_text() == "of another recording"
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+
+
 def test_a_folder_that_cannot_be_made_is_refused(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(DeviceRefused, match="cannot be written"):
         TumWriter(tmp_path / "file" / "recording").__enter__()
 
 
-def test_a_disk_that_fills_up_is_told(tmp_path: Path) -> None:
-    (tmp_path / "camera.yaml").mkdir()
-    with (
-        TumWriter(tmp_path) as writer,
-        pytest.raises(DeviceRefused, match=r"camera\.yaml: cannot be"),
-    ):
-        writer.write(small_frame(0))
+def test_calibration_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
+    with TumWriter(tmp_path) as writer:
+        (tmp_path / "camera.yaml").mkdir()
+        with pytest.raises(DeviceRefused, match=r"camera\.yaml: cannot be"):
+            writer.write(small_frame(0))
 
 
 def test_time_must_go_on_and_the_camera_stay_the_same(tmp_path: Path) -> None:

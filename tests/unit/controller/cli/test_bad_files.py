@@ -79,7 +79,7 @@ def test_two_outputs_of_a_drive_in_one_file(config: str, tmp_path: Path) -> None
     (tmp_path / "also.mp4").symlink_to(tmp_path / "both.mp4")
     outputs = ("--observations", tmp_path / "both.mp4", "--video", tmp_path / "also.mp4")
     message = refusal("run", "--config", CONFIG_DIR / config, *outputs)
-    assert "both.mp4: is to hold the observations and the video; name two files" in message
+    assert "both.mp4: cannot hold both the observations and the video; name two files" in message
     assert not (tmp_path / "both.mp4").exists()
 
 
