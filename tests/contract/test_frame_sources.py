@@ -187,7 +187,7 @@ def test_too_early_is_a_timeout_after_the_time_given_and_loses_no_frame(live: Ca
         assert live.source.read(LONG_S).sequence == first.sequence + 1
 
 
-def test_whoever_does_not_keep_up_gets_the_newest_and_no_queue(live: Case) -> None:
+def test_slow_reader_gets_the_newest_frame_and_no_queue(live: Case) -> None:
     with live.source:
         frames = [live.source.read(LONG_S) for _ in range(2)]
         delay_ns = live.clock.now_ns() - frames[1].captured_ns

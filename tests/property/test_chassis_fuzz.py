@@ -36,7 +36,7 @@ def spiced(rng: random.Random, spices: list[bytes]) -> bytes:
     return bytes(chunk)
 
 
-def test_of_spoilt_kobuki_bytes_only_whole_frames_are_taken() -> None:
+def test_only_whole_frames_are_taken_from_damaged_kobuki_bytes() -> None:
     rng = random.Random(1)
     core = kobuki_packets.frame(b"\x01\x0f" + bytes(15) + b"\x04\x07" + bytes(7))
     wrong = core[:-1] + bytes((core[-1] ^ 1,))
@@ -63,7 +63,7 @@ def test_kobuki_takes_nothing_that_was_not_sent_whole() -> None:
         assert reader.feed(bytes(frame)) == []
 
 
-def test_of_spoilt_roboteq_bytes_only_whole_values_are_taken() -> None:
+def test_only_whole_values_are_taken_from_damaged_roboteq_bytes() -> None:
     rng = random.Random(3)
     spices = [b"\rC=1:-2\r", b"\rFF=0\r", b"\r+\r", b"\r-\r", b"=", b":", b"C=", b"\r" + b"9" * 50, b"\r?C\r"]
     reader, right, fed = LineReader(), 0, 0
@@ -94,7 +94,7 @@ def test_a_roboclaw_answer_is_accepted_by_its_checksum_alone(share: int) -> None
     assert right > 0.4 * share
 
 
-def test_of_spoilt_agilex_bytes_only_whole_frames_are_taken() -> None:
+def test_only_whole_frames_are_taken_from_damaged_agilex_bytes() -> None:
     rng = random.Random(6)
     state = agilex_serial.wrap(CanFrame(0x211, bytes(8)), 0) or b""
     wrong = state[:-1] + bytes((state[-1] ^ 1,))

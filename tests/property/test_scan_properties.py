@@ -51,7 +51,7 @@ IMPOSSIBLE = st.one_of(
 
 
 @given(IMPOSSIBLE)
-def test_one_number_that_cannot_be_is_refused_by_its_name(told: tuple[str, FreeSpace]) -> None:
+def test_impossible_number_is_refused_with_its_name(told: tuple[str, FreeSpace]) -> None:
     name, scan = told
     with pytest.raises(SceneError, match=f"the scan of the free space is impossible: {name} "):
         check_scan(scan)

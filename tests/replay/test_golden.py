@@ -11,7 +11,7 @@ from tests.replay import golden
 
 
 @pytest.mark.parametrize("name", golden.SOURCES)
-def test_the_same_is_seen_as_before(name: str) -> None:
+def test_observations_equal_the_golden_ones(name: str) -> None:
     before, now = golden.read(golden.EXPECTED / f"{name}.jsonl"), golden.SOURCES[name]()
     found = golden.changes(before, now)
     if found:
@@ -52,7 +52,7 @@ def changed(frame: int, obstacle: int, **values: object) -> list[str]:
     return golden.changes(BEFORE, now)
 
 
-def test_nothing_changed_is_nothing_said() -> None:
+def test_unchanged_observations_give_no_message() -> None:
     assert golden.changes(BEFORE, copy.deepcopy(BEFORE)) == []
 
 

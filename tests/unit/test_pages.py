@@ -46,5 +46,5 @@ def test_every_key_they_name_is_one(key: str) -> None:
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 @pytest.mark.parametrize("from_file", ["README.md", "CONTRIBUTING.md", "docs/design.md"])
-def test_they_are_found(page: Page, from_file: str) -> None:
+def test_page_is_linked_where_readers_look_for_it(page: Page, from_file: str) -> None:
     assert page.name.removeprefix("docs/") in (ROOT / from_file).read_text()

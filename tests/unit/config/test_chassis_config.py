@@ -139,7 +139,7 @@ def test_a_mirrored_motor_counts_backwards(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("section", ["body", "limits", "camera_mount"])
-def test_nothing_of_a_real_robot_is_guessed(section: str, tmp_path: Path) -> None:
+def test_real_robot_without_a_section_is_refused(section: str, tmp_path: Path) -> None:
     content = yaml.safe_load((CONFIG_DIR / "robot-roboteq.yaml").read_text())
     del content["robot"][section]
     changed = tmp_path / "robot.yaml"

@@ -87,7 +87,7 @@ def sees_it_go_back(now_ns: int, index: int, v_mps: float) -> Scene:
     return replace(scene(now_ns, index), ego_motion=ego)
 
 
-def test_it_ends_the_drive_before_the_robot_has_gone_far_and_says_why() -> None:
+def test_contradiction_ends_the_drive_early_and_says_why() -> None:
     loop, steps = loop_on(ObedientChassis(), 10.0), list[ControlStep]()
     while not loop.finished and len(steps) < 1000:
         k, v_mps = len(steps), steps[-1].setpoint.v_mps if steps else 0.0
@@ -97,7 +97,7 @@ def test_it_ends_the_drive_before_the_robot_has_gone_far_and_says_why() -> None:
     assert steps[-1].progress_m < 1.0
 
 
-def test_it_ends_a_governed_drive_too() -> None:
+def test_contradiction_ends_a_governed_drive_too() -> None:
     rig = Rig()
     rig.run(2.0)
     for k in range(len(rig.steps), len(rig.steps) + 500):

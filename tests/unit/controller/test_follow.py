@@ -111,7 +111,7 @@ def test_unknown_pose_means_straight_on() -> None:
     assert follower.step(OnPath(2.0, 0.0, math.inf), 1.0) == 0.0
 
 
-def test_far_away_it_turns_no_faster_than_allowed() -> None:
+def test_yaw_rate_stays_within_its_limit_far_from_the_path() -> None:
     follower = PathFollower(hook(2.0), ROBOT.limits)
     assert follower.step(OnPath(2.0, 3.0, 1.5), 1.5) == -ROBOT.limits.max_yaw_rate_radps
     assert follower.step(OnPath(2.0, -3.0, -1.5), 1.5) == ROBOT.limits.max_yaw_rate_radps

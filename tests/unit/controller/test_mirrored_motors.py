@@ -13,7 +13,7 @@ from tests.support.chassis_rig import MS, PLANT
 
 @pytest.mark.parametrize("kind", ["roboclaw", "roboteq"])
 @pytest.mark.parametrize("mirrored", [("invert_left",), ("invert_right",), ("invert_left", "invert_right")])
-def test_it_drives_straight_ahead(kind: str, mirrored: tuple[str, ...]) -> None:
+def test_base_with_mirrored_motors_drives_straight_ahead(kind: str, mirrored: tuple[str, ...]) -> None:
     config = load_app(CONFIG_DIR / f"hil-{kind}.yaml").chassis
     config = config.model_copy(update=dict.fromkeys(mirrored, True))
     near, far = serial_pair()

@@ -50,7 +50,7 @@ def two_cameras(folder: Path) -> Path:
     return write_bag(folder, "mcap", entries)
 
 
-def test_of_two_recorded_cameras_one_is_chosen(tmp_path: Path) -> None:
+def test_one_of_two_recorded_cameras_is_chosen(tmp_path: Path) -> None:
     rear = {key: topic.replace("/camera/", "/rear/") for key, topic in TOPICS.items()}
     with recorded_camera(two_cameras, tmp_path, SimulatedClock(), **rear) as camera:
         assert camera.read(1.0).sequence == 0

@@ -160,7 +160,7 @@ def _return_nothing(*_: object) -> object:
 
 @pytest.mark.parametrize("failure", [_raise_error, _return_nothing])
 @pytest.mark.parametrize("warm_up", [30, 120, 400])
-def test_when_ruckig_fails_it_brakes_by_the_stop_profile(
+def test_shaper_brakes_by_the_stop_profile_if_ruckig_fails(
     failure: Callable[..., object], warm_up: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     shaper = SpeedShaper(Limits(), PERIOD_S)

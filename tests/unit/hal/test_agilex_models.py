@@ -108,7 +108,7 @@ def test_more_motors_than_the_model_has_are_a_wrong_model(other: ActuatorFast | 
 
 
 @pytest.mark.parametrize("bench", [Bench("scout"), Bench("bunker", actuators=4)], ids=["model", "file"])
-def test_as_many_motors_as_there_are_may_report(bench: Bench) -> None:
+def test_each_motor_of_a_model_may_report(bench: Bench) -> None:
     bench.exchange(ActuatorFast(3, 0, 0.0, 0), ActuatorSlow(3, 25.0, 20, 20, 0x40))
     bench.arm()
 
@@ -150,7 +150,7 @@ def test_tracer_in_the_hands_of_its_remote_control() -> None:
     assert modes(bench) == [], "it is left in charge"
 
 
-def test_over_serial_the_mode_of_can_is_somebody_else() -> None:
+def test_can_mode_over_serial_means_another_master() -> None:
     config = agilex_config(SerialLinkConfig(url="loop://"), model="bunker", track_width_m=None)
     link = ScriptedCanLink()
     chassis = AgilexChassis(link, config)

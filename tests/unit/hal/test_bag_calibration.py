@@ -96,7 +96,7 @@ def test_depth_from_an_unknown_place_is_told(tmp_path: Path) -> None:
     assert f"no transform from {DEPTH_FRAME} to {COLOUR_FRAME} was recorded" in " ".join(replay.notes)
 
 
-def test_one_place_with_two_lenses_is_no_one_camera(tmp_path: Path) -> None:
+def test_depth_beyond_the_view_of_colour_is_not_registered(tmp_path: Path) -> None:
     """Simulators name one frame for both: what is in the corner of the wider one is beyond colour's."""
     path = write_bag(tmp_path, "mcap", lambda ros: other_depth(ros, ros.info(COLOUR_FRAME, WIDE)))
     replay = BagReplay(path)

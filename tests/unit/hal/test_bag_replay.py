@@ -250,5 +250,5 @@ def test_how_often_frames_come_is_not_a_matter_of_other_topics(tmp_path: Path) -
     assert BagReplay(write_bag(tmp_path, "mcap", entries)).fps == pytest.approx(30.0, rel=1e-6)
 
 
-def test_of_one_image_it_is_not_known_how_often_they_come(tmp_path: Path) -> None:
+def test_rate_of_a_single_image_is_unknown(tmp_path: Path) -> None:
     assert BagReplay(small_bag(tmp_path, count=1)).fps is None

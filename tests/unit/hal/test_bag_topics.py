@@ -73,7 +73,7 @@ def test_rectified_and_registered_topics_are_known_by_name() -> None:
     assert chosen("/rgb/image_raw", "/depth_registered/image_raw").says_registered
 
 
-def test_of_two_cameras_that_are_as_good_one_is_to_be_chosen() -> None:
+def test_user_must_choose_between_equal_cameras() -> None:
     names = ("/front/color/image_raw", "/front/depth/image_raw", "/rear/color/image_raw")
     with pytest.raises(BadRecording, match=r"colour: /front/.*, /rear/.*; choose one with --colour-topic"):
         chosen(*names)

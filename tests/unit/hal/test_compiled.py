@@ -70,7 +70,7 @@ def test_another_type_is_refused_and_not_compiled_in_the_middle_of_a_drive(value
         _halves_over(values, 2.0)
 
 
-def test_where_nothing_can_be_kept_it_is_compiled_all_the_same_and_says_so(
+def test_step_is_compiled_with_a_message_if_it_cannot_be_cached(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A function of no file, for which the compiler finds no place."""

@@ -28,7 +28,7 @@ def test_the_slack_and_the_share_may_be_apart() -> None:
     assert fed(0.0, -0.0022, 60).sentence != ""
 
 
-def test_it_is_taken_back_when_they_agree_again() -> None:
+def test_disagreement_is_withdrawn_when_both_agree_again() -> None:
     disagreement = fed(1.0, 0.0, 51)
     for k in range(51, 110):
         disagreement.expect(0.01)

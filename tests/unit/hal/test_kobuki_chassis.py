@@ -82,7 +82,7 @@ def test_its_own_sensors_stop_and_latch(switch: str, bits: int, words: str) -> N
     bench.arm()
 
 
-def test_docked_it_may_drive_off() -> None:
+def test_docked_base_may_drive_off() -> None:
     bench = Bench()
     bench.emulator.charger = 2
     bench.arm()

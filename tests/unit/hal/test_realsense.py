@@ -223,14 +223,14 @@ def test_another_serial_number_is_device_not_found_and_tells_the_connected_ones(
         camera.__enter__()
 
 
-def test_of_several_cameras_one_must_be_named() -> None:
+def test_serial_number_is_required_among_several_cameras() -> None:
     camera, vendor, _ = camera_over(*framesets(0, 1))
     vendor.devices = [vendor.device, FakeDevice(serial="2")]
     with pytest.raises(DeviceNotFound, match=r"several cameras are connected \(000000000001, 2\)"):
         camera.__enter__()
 
 
-def test_of_several_cameras_the_named_one_is_opened() -> None:
+def test_camera_with_the_configured_serial_number_is_opened() -> None:
     camera, vendor, _ = camera_over(*framesets(0, 1), serial="2")
     vendor.devices = [vendor.device, FakeDevice(serial="2")]
     with camera:

@@ -36,5 +36,5 @@ def test_records_of_arrays_are_themselves_only() -> None:
     assert _Places(x_m) != _Places(x_m)
 
 
-def test_nothing_else_can_be_written_on_it() -> None:
+def test_record_accepts_no_further_attributes() -> None:
     assert not hasattr(_Place(1.0), "__dict__")

@@ -184,7 +184,7 @@ def test_a_port_that_comes_back_is_opened_again(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("url", "elsewhere"), [("socket://10.0.0.7:4001", True), ("/dev/ttyUSB0", False)])
-def test_over_a_network_it_is_opened_again_beside_the_control_loop(
+def test_network_port_is_reopened_outside_the_control_loop(
     monkeypatch: pytest.MonkeyPatch, url: str, elsewhere: bool
 ) -> None:
     """A host that does not answer is waited for, for seconds."""

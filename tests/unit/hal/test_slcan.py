@@ -49,7 +49,7 @@ def test_a_slcan_adapter_is_heard_again_after_noise_that_is_no_ascii(noise: byte
         assert heard == CanFrame(0x221, bytes.fromhex("FE0C00FA00000000"))
 
 
-def test_a_slcan_adapter_that_takes_nothing_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_blocked_slcan_adapter_does_not_block_the_control_loop(monkeypatch: pytest.MonkeyPatch) -> None:
     """python-can drains the port behind every frame, without a time-out."""
     with PseudoTerminal() as adapter, CanBusLink(slcan(adapter)) as link:
         monkeypatch.setattr(termios, "tcdrain", lambda port: pytest.fail("waits for the adapter"))

@@ -58,13 +58,13 @@ def test_one_lost_image_does_not_shift_all_that_follow() -> None:
     assert paired(stamps, stamps[1:])[0] == [(one, one) for one in stamps[1:]]
 
 
-def test_of_more_colour_than_depth_those_of_the_same_time_are_taken() -> None:
+def test_surplus_colour_images_are_paired_by_time() -> None:
     assert paired(list(range(0, 400, 11)), list(range(11, 400, 22)))[0] == [
         (one, one) for one in range(11, 400, 22)
     ]
 
 
-def test_where_one_stream_has_ended_the_other_does_not_pile_up() -> None:
+def test_images_do_not_pile_up_after_the_other_stream_has_ended() -> None:
     for ended in ("colour", "depth"):
         pairing: StampPairing[None] = StampPairing(GAP)
         stream = pairing.depth if ended == "colour" else pairing.colour

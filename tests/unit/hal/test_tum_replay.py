@@ -244,7 +244,7 @@ def test_times_out_of_order_are_sorted_and_equal_ones_counted(recording: Path) -
     assert any(note.endswith("index lines out of time order, sorted") for note in replay.notes)
 
 
-def test_when_no_frame_is_usable_the_recording_is_bad_and_the_first_reason_told(recording: Path) -> None:
+def test_recording_without_a_usable_frame_is_refused_with_the_first_reason(recording: Path) -> None:
     set_key(recording, "width", "640")
     with (
         TumReplay(recording) as replay,

@@ -102,7 +102,7 @@ def test_velocity_and_heading_are_derivatives(corner_y: float) -> None:
 
 
 @pytest.mark.parametrize("corner_y", [0.4, 3.0])
-def test_over_times_is_the_state_at_each(corner_y: float) -> None:
+def test_states_over_times_equal_the_state_at_each_time(corner_y: float) -> None:
     steps = go(3.0, 0.0), go(5.0, corner_y), Wait(kind="wait", duration_s=0.5), go(6.0, 0.0)
     trajectory = Trajectory(PlanarPose(0.5, -1.0, 2.0), motion(*steps, start_s=0.4))
     times = np.append(np.arange(-0.5, trajectory.end_s + 1.0, 0.037), trajectory.end_s)
@@ -113,6 +113,6 @@ def test_over_times_is_the_state_at_each(corner_y: float) -> None:
     ]
 
 
-def test_over_times_of_what_stands() -> None:
+def test_states_over_times_of_a_standing_body() -> None:
     states = Trajectory(PlanarPose(1.0, -2.0, 0.5), None).sample(np.array([-3.0, 0.0, 99.0]))
     assert states.tolist() == [[1.0, -2.0, 0.5, 0.0, 0.0]] * 3

@@ -70,7 +70,7 @@ def test_is_the_world_seen_from_above(t_s: float) -> None:
         assert plane.moves[k] == state.moves
 
 
-def test_over_times_is_the_look_at_each() -> None:
+def test_views_over_times_equal_the_view_at_each_time() -> None:
     plane = PlanarWorld(SCENARIO, seed=5)
     times = np.array([0.0, 1.7, 3.3])
     for body in range(len(plane)):

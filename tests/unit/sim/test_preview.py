@@ -20,7 +20,7 @@ BEND = PathSpec(
 )
 
 
-def test_it_writes_four_pictures_in_one(tmp_path: Path) -> None:
+def test_preview_holds_four_pictures(tmp_path: Path) -> None:
     out = tmp_path / "look.png"
     done = CliRunner().invoke(main, ["crossing", "--time", "4.0", "--along", "3.0", "--out", str(out)])
     assert done.exit_code == 0, done.output

@@ -64,7 +64,7 @@ def test_a_little_less_than_half_that_agree_are_enough(monkeypatch: pytest.Monke
     assert not seen.reckoned
 
 
-def test_with_odometry_the_few_that_agree_with_it_are_believed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_few_fragments_that_agree_with_the_odometry_are_believed(monkeypatch: pytest.MonkeyPatch) -> None:
     agreeing(monkeypatch, 0.2)
     seen = last(odometry=True)
     assert seen.health.condition is CameraCondition.GOOD

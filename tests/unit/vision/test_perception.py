@@ -193,7 +193,7 @@ def test_the_same_frames_give_the_same_scenes_to_the_last_bit() -> None:
 
 
 @pytest.mark.parametrize("since_ns", [0, -(10**12), 1_700_000_000 * 10**9])
-def test_when_time_began_is_all_the_same(since_ns: int) -> None:
+def test_origin_of_time_changes_nothing(since_ns: int) -> None:
     take = sideways(0.5, 0.1)
     eyes, start_ns = perception(), take.frames[0].captured_ns
     for frame, expected in zip(take.frames, watch(take, False), strict=True):

@@ -113,7 +113,7 @@ def test_a_person_who_leaves_a_table_is_the_mover_and_not_the_table() -> None:
     np.testing.assert_allclose(mover.position_m[0], -0.25 - way_m(steps), atol=0.03)
 
 
-def test_somebody_may_come_into_a_view_in_which_there_was_nothing() -> None:
+def test_body_is_tracked_that_enters_an_empty_view() -> None:
     """Beyond 10 m only; then he stands there from one frame to the next."""
     hall = wall(12.0)
     percepts = track([hall] * 20 + [nearest(walker(0.0), hall)] * 5)

@@ -159,7 +159,7 @@ def test_a_target_without_permission_is_told(tmp_path: Path, monkeypatch: pytest
         command.run_bench(10, tmp_path / "bench.json")
 
 
-def test_one_short_run_of_everything(tmp_path: Path) -> None:
+def test_short_bench_of_all_stages_gives_all_figures(tmp_path: Path) -> None:
     (tmp_path / "plain.yaml").write_text(SCENARIO)
     mission = tmp_path / "mission.yaml"
     mission.write_text(

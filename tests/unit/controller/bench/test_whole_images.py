@@ -41,7 +41,7 @@ def test_the_first_image_is_searched_and_the_next_one_followed_there_and_back(wh
     assert again == ["cvtColor", "findContours", "calcOpticalFlowPyrLK", "calcOpticalFlowPyrLK"]
 
 
-def test_where_nothing_is_found_nothing_is_followed(whole: WholeImages) -> None:
+def test_without_points_found_none_are_followed(whole: WholeImages) -> None:
     blank = np.full((240, 320, 3), 90, np.uint8)
     whole.step(blank)
     assert "calcOpticalFlowPyrLK" not in names(whole, blank)

@@ -120,7 +120,7 @@ def test_every_mission_is_run_once_however_many_there_are() -> None:
     assert len(list(run_local(tasks, 2))) == 12
 
 
-def test_one_mission_alone_says_how_it_went() -> None:
+def test_single_mission_prints_its_result() -> None:
     code, output = campaign("--only", "plain_wall:3", "--policies", "field")
     assert code == 0
     assert re.fullmatch(

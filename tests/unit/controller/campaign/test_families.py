@@ -30,7 +30,7 @@ def test_missions_start_clear_and_are_solvable_unless_they_are_blocked(family: s
 
 
 @pytest.mark.parametrize("family", FAMILY_NAMES)
-def test_nobody_walks_through_racks(family: str) -> None:
+def test_walkers_of_all_families_stay_clear_of_racks(family: str) -> None:
     for seed in range(6):
         world = Stage(generate(family, seed), CONFIG.robot).world
         times = np.arange(0.0, 25.0, 0.25)

@@ -134,7 +134,7 @@ def test_the_driver_takes_over_the_robot_as_it_is(gain_mps2: float, at_fault: in
     assert (row.contacts, row.contacts_at_fault) == (1, at_fault)
 
 
-def test_nobody_sees_in_who_stands_that_it_will_go_on() -> None:
+def test_body_that_stands_shows_no_sign_of_moving_on() -> None:
     """It comes to 1.5 m beside the path in full view, stands, and walks into the robot's side."""
     steps = (
         Go(kind="go", x_m=4.5, y_m=1.5, speed_mps=1.5),

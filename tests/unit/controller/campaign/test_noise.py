@@ -53,7 +53,7 @@ def test_without_noise_the_scene_is_the_truth() -> None:
     assert velocity[:2] == pytest.approx([-1.0, 0.0], abs=0.02)
 
 
-def test_it_is_reported_from_the_third_sighting_on_with_one_id() -> None:
+def test_track_is_reported_from_its_third_sighting_on_with_one_id() -> None:
     found = scenes(stage(crate(5.0)), 10, QUIET)
     assert [len(one.obstacles) for one in found[:4]] == [0, 0, 1, 1]
     assert {one.obstacles[0].id for one in found[2:]} == {1}
@@ -109,7 +109,7 @@ def test_hidden_track_is_forgotten_after_half_a_second_and_gets_a_new_id() -> No
     assert sum(gap) > 0.5 * CAMERA.fps
 
 
-def test_of_what_goes_out_of_sight_nothing_new_is_known() -> None:
+def test_hidden_body_gets_no_new_measurement() -> None:
     """It stops behind the crate: while it is remembered, it goes on as it was seen to."""
     made = stage(mover(8.0, -4.0, 8.0, -0.9, 1.0), crate(4.0, 0.0, size_m=1.2))
     walkers = [one for scene in scenes(made, 200, QUIET) for one in scene.obstacles if one.moving]
@@ -146,7 +146,7 @@ def test_body_that_hangs_above_the_robot_is_no_obstacle(under_m: float, listed: 
     assert any(one.obstacles for one in scenes(stage(hangs), 5, QUIET)) == listed
 
 
-def test_of_what_is_nearer_than_the_least_depth_nothing_is_measured() -> None:
+def test_body_nearer_than_the_minimum_depth_is_not_measured() -> None:
     """A crate of 0.6 m before a camera that sits 0.45 m ahead of the robot's middle."""
     for gap_m, seen in ((CAMERA.depth_min_m + 0.02, True), (CAMERA.depth_min_m - 0.02, False)):
         last = scenes(stage(crate(0.45 + gap_m + 0.3)), 5, QUIET)[-1]

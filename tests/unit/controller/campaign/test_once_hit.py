@@ -27,13 +27,13 @@ from tests.support.campaign import CONFIG
         ("curved_path", 9300051),
     ],
 )
-def test_nobody_is_touched_any_more(family: str, seed: int) -> None:
+def test_missions_that_once_ended_in_a_collision_no_longer_do(family: str, seed: int) -> None:
     (row,) = run_task(Task(family, seed, ("ours",), "noise", CONFIG))
     assert row.reached
     assert row.contacts_at_fault == 0
 
 
-def test_nobody_is_waited_for_who_has_walked_on() -> None:
+def test_robot_does_not_wait_for_a_body_that_has_walked_on() -> None:
     """It walked through the blind place before the nose, was seen too shortly for the verdict that it
     moves, and was remembered as standing there for ever."""
     (row,) = run_task(Task("crowd_junction", 400015, ("ours",), "noise", CONFIG))

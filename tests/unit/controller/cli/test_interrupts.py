@@ -110,7 +110,7 @@ def test_the_very_first_process_does_not_hear_it(tmp_path: Path) -> None:
     assert done.stdout.split() == ["True", "True", "False", "False"]
 
 
-def test_one_that_came_meanwhile_is_not_lost() -> None:
+def test_interrupt_during_the_block_is_delivered_after_it() -> None:
     with pytest.raises(KeyboardInterrupt), held(signal.SIGINT):
         signal.raise_signal(signal.SIGINT)
 

@@ -59,7 +59,7 @@ def test_the_end_of_a_rack_is_a_blind_corner(side: int) -> None:
     assert corner.beside_m == pytest.approx(0.6, abs=0.05)
 
 
-def test_it_is_remembered_until_the_front_is_past_the_opening_behind_it() -> None:
+def test_corner_is_remembered_until_the_front_is_past_the_opening_behind_it() -> None:
     aisle = Aisle(5.0, 0.6, 1)
     for s_m in np.arange(1.0, 5.4, 0.05):
         aisle.look(float(s_m))

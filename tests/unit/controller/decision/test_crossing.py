@@ -101,7 +101,7 @@ def test_pass_first_when_the_whole_body_is_past_before_it_enters() -> None:
     assert choose(later, 1.5, enter_s=1.1).first_mps == math.inf
 
 
-def test_far_away_nothing_has_to_be_slowed() -> None:
+def test_distant_conflict_does_not_lower_the_speed() -> None:
     far = Conflict(0, 1.0, 2.0, 9.0, 9.0, 10.0)
     assert choose(far, 1.5).yield_mps == math.inf
 

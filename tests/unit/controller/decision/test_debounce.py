@@ -10,7 +10,7 @@ ONE = np.array([7])
 YES, NO = np.array([True]), np.array([False])
 
 
-def test_it_turns_only_after_it_has_settled() -> None:
+def test_debounced_value_changes_only_after_it_has_settled() -> None:
     flags = Debounced(0.3)
     assert not flags.update(ONE, YES, NO, 10.0)[0]
     assert not flags.update(ONE, YES, NO, 10.29)[0]
@@ -48,7 +48,7 @@ def test_a_no_may_need_no_time_either() -> None:
     assert not flags.update(ONE, NO, YES, 0.1)[0]
 
 
-def test_each_has_its_own_and_who_is_gone_is_forgotten() -> None:
+def test_each_id_has_its_own_state_and_lost_ids_are_forgotten() -> None:
     flags = Debounced(0.0)
     both = flags.update(np.array([1, 2]), np.array([True, False]), np.array([True, False]), 0.0)
     assert both.tolist() == [True, False]

@@ -123,7 +123,7 @@ def test_closing_in_on_the_target_is_no_wish_to_go_faster(
         (-0.3, "crossing", "crosses 0.3 m ahead and stays"),
     ],
 )
-def test_what_is_waited_for_out_of_view_is_told_as_not_seen(forward_mps: float, rule: str, what: str) -> None:
+def test_reason_says_that_the_awaited_body_is_not_seen(forward_mps: float, rule: str, what: str) -> None:
     """Below the view of a camera that sees the floor from 1.3 m on; somebody may have carried it away."""
     bench, pallet = Bench(), obstacle(2.2, 0.0, forward_mps, size_m=(0.5, 0.1))
     bench.settle(pallet, v_mps=0.3)

@@ -188,7 +188,7 @@ def test_after_a_fault_the_speed_comes_back_as_after_an_obstacle(v_mps: float, d
     assert decision.reason.sentence == f"not yet faster after: {fault.sentence}"
 
 
-def test_a_fault_at_rest_is_no_turn_to_slower() -> None:
+def test_fault_at_rest_does_not_count_as_a_decrease() -> None:
     """It goes again after delay_s, not after hold_s."""
     bench = Bench()
     bench.settle(v_mps=0.0)

@@ -100,7 +100,7 @@ def test_a_first_sight_too_near_brakes_at_once() -> None:
     assert bench.step(bench.scene(young), 1.0).target_speed_mps < 0.8
 
 
-def test_where_an_obstacle_could_leave_unseen_it_stands_further_away() -> None:
+def test_robot_stops_farther_from_an_obstacle_that_could_leave_unseen() -> None:
     """Half beside the view's edge: stopping at 0.45 m, the robot could not see it any more."""
     central = Bench().settle(obstacle(3.0, 0.0), v_mps=0.8)
     beside = Bench().settle(obstacle(3.0, 0.6), v_mps=0.8)
@@ -171,13 +171,13 @@ def test_unseen_body_that_left_the_path_is_not_assumed_to_turn_back(
     assert before - after == pytest.approx(differs_mps)
 
 
-def test_nobody_is_started_into() -> None:
+def test_robot_at_rest_does_not_start_while_a_person_walks_towards_its_side() -> None:
     """A person beside the nose of a robot at rest walks into where its side would be."""
     walks_in = obstacle(0.9, 1.6, vy_mps=-0.7, sigma_mps=0.05)
     assert Bench().settle(walks_in, v_mps=0.0).target_speed_mps == 0.0
 
 
-def test_nobody_is_started_past_with_hardly_a_hand_between() -> None:
+def test_robot_at_rest_waits_for_a_body_5_cm_beside_it() -> None:
     """Somebody leaves along the side of a robot at rest: 5 cm clear of it he is waited for, 50 cm clear not.
 
     Driving, the robot would be past him.

@@ -38,7 +38,7 @@ def test_standing_before_an_obstacle_it_says_since_when() -> None:
     assert decision.stuck_since_ns == first.stuck_since_ns
 
 
-def test_it_goes_again_by_itself_a_little_after_the_way_is_free() -> None:
+def test_robot_starts_again_shortly_after_the_way_is_free() -> None:
     bench = Bench()
     for _ in range(150):
         bench.step(bench.scene(obstacle(1.2, 0.0)), 0.0)
@@ -50,7 +50,7 @@ def test_it_goes_again_by_itself_a_little_after_the_way_is_free() -> None:
     assert bench.step(bench.scene(), 0.0).stuck_since_ns is None
 
 
-def test_it_does_not_creep_on_whenever_what_stands_there_is_missed_for_a_moment() -> None:
+def test_robot_does_not_creep_on_when_a_standing_obstacle_is_briefly_missed() -> None:
     """Half a second of every second; in the first gap it cannot know that it comes back."""
     bench = Bench()
     there = obstacle(1.2, 0.0)
@@ -73,7 +73,7 @@ def test_obstacle_that_comes_and_goes_keeps_a_rolling_robot_from_getting_faster(
     assert targets[-1] > 0.4
 
 
-def test_once_it_has_been_gone_for_a_second_the_way_is_free() -> None:
+def test_way_is_free_once_the_obstacle_has_been_gone_for_a_second() -> None:
     bench = Bench()
     there = obstacle(1.2, 0.0)
     for frame in range(75):
@@ -97,7 +97,7 @@ def test_obstacle_that_returns_much_later_does_not_count_as_coming_and_going() -
     assert waited * 0.02 <= 0.3
 
 
-def test_it_does_not_creep_up_to_what_blocks_the_way() -> None:
+def test_robot_does_not_creep_up_to_an_obstacle() -> None:
     """10 cm more than the margin is no reason to start."""
     bench = Bench()
     for _ in range(200):
@@ -175,7 +175,7 @@ def test_a_crate_is_not_started_for_at_what_would_do_beside_a_person() -> None:
     assert Bench(config=config).settle(near, v_mps=0.0).target_speed_mps == 0.0
 
 
-def test_nobody_is_started_beside_as_slowly_as_it_may_creep() -> None:
+def test_robot_does_not_start_at_creep_speed_beside_a_body() -> None:
     """Who could step into the way allows 0.25 m/s: too little to set off with, below beside_mps."""
     near = obstacle(1.0, 0.7, vx_mps=0.5, vy_mps=-0.4, sigma_mps=0.05)
     decision = Bench().settle(near, v_mps=0.0)

@@ -59,7 +59,7 @@ def test_body_that_did_not_surely_stand_is_not_kept_in_the_view(
     assert recall.see(None, 1.0 + 1e-3) == kept
 
 
-def test_far_away_it_does_not() -> None:
+def test_distant_missing_body_does_not_count() -> None:
     recall = Recall()
     recall.see(box(8.0, 0.0), 1.0)
     assert recall.see(None, 1.1) == []

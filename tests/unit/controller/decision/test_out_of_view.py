@@ -47,7 +47,7 @@ def test_body_seen_too_briefly_is_not_kept() -> None:
     assert recall.see(None, 3.6) == []
 
 
-def test_it_is_forgotten_when_it_has_been_passed() -> None:
+def test_remembered_body_is_forgotten_once_it_is_passed() -> None:
     recall = Recall()
     recall.see(PALLET, 3.2)
     recall.see(None, 3.6)
@@ -55,7 +55,7 @@ def test_it_is_forgotten_when_it_has_been_passed() -> None:
     assert recall.see(None, 6.9) == []
 
 
-def test_it_is_forgotten_when_its_place_is_seen_again() -> None:
+def test_remembered_body_is_forgotten_when_its_place_is_seen_again() -> None:
     recall = Recall()
     recall.see(PALLET, 3.2)
     for _ in range(100):  # for ten seconds
@@ -63,7 +63,7 @@ def test_it_is_forgotten_when_its_place_is_seen_again() -> None:
     assert recall.see(None, 2.0, free=ALL_SEEN) == []
 
 
-def test_it_is_not_counted_twice_when_it_is_seen_again() -> None:
+def test_body_that_is_seen_again_is_not_counted_twice() -> None:
     recall = Recall()
     recall.see(PALLET, 3.2)
     recall.see(None, 3.6)
@@ -206,7 +206,7 @@ def test_approaching_mover_may_be_a_little_late() -> None:
 
 
 @pytest.mark.parametrize("speed_mps", [0.8, 1.3])
-def test_nobody_has_passed_before_the_robot_unseen(speed_mps: float) -> None:
+def test_unseen_body_is_not_assumed_to_have_passed_before_the_robot(speed_mps: float) -> None:
     """Long unseen, it may be late by more than the view is wide there: it stays this side of the middle."""
     recall = Recall()
     far = replace(
@@ -231,7 +231,7 @@ def test_only_who_clearly_comes_may_be_late(sigma_mps: float, y_m: float) -> Non
 
 
 @pytest.mark.parametrize("known_m", [0.5, float("nan")])
-def test_where_nothing_was_seen_it_may_still_be(known_m: float) -> None:
+def test_body_may_still_be_where_nothing_was_seen(known_m: float) -> None:
     """Not through the whole of where it was expected, or not known how far."""
     recall = Recall()
     free = replace(ALL_SEEN, known_m=np.full(20, known_m))
@@ -242,7 +242,7 @@ def test_where_nothing_was_seen_it_may_still_be(known_m: float) -> None:
     assert kept.unseen_s.tolist() == pytest.approx([0.1])
 
 
-def test_it_is_kept_out_only_as_far_as_the_view_is_seen_through_without_a_gap() -> None:
+def test_body_is_excluded_only_where_the_view_is_seen_through_without_a_gap() -> None:
     recall = Recall()
     gap = np.where(BANDS < -0.35, 0.0, 8.0)
     free = replace(ALL_SEEN, known_m=gap)
@@ -251,7 +251,7 @@ def test_it_is_kept_out_only_as_far_as_the_view_is_seen_through_without_a_gap() 
     assert kept.xy_m[0].tolist() == pytest.approx([0.99, 0.35 * 0.74 + 0.2])
 
 
-def test_whoever_is_too_low_to_be_seen_so_near_may_still_be_there() -> None:
+def test_body_too_low_for_the_near_view_may_still_be_there() -> None:
     recall = Recall()
     recall.recall(replace(LEAVING, top_m=np.array([0.2])), 0.0, ALL_SEEN, standing=True)
     kept = recall.recall(None, 0.0, ALL_SEEN, standing=True)

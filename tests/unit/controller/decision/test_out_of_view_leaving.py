@@ -68,7 +68,7 @@ def narrow(bodies: Bodies) -> Bodies:
     return replace(bodies, half_across_m=np.array([0.03]))
 
 
-def test_nobody_was_never_wider_than_the_end_of_a_rack() -> None:
+def test_leaving_body_that_was_never_wider_than_a_strip_is_not_moving() -> None:
     coming = measured(narrow(AT_EDGE), -0.4)
     assert after(coming, expected(narrow(AT_EDGE))).moving.tolist() == [False]
     assert after(AT_EDGE, coming, expected(narrow(AT_EDGE))).moving.tolist() == [True]
@@ -165,7 +165,7 @@ def test_body_seen_with_the_expected_velocity_replaces_the_expected_one() -> Non
         ),
     ],
 )
-def test_somebody_else_in_its_place_does_not_make_it_forgotten(newcomer: Bodies) -> None:
+def test_another_body_in_its_place_does_not_erase_a_remembered_one(newcomer: Bodies) -> None:
     """Two walk one behind the other: when one of them is seen again, the other is still there."""
     assert kept_beside(newcomer, EXPECTED) == [1]
 

@@ -74,7 +74,7 @@ def test_a_crosser_may_stop_dead_in_the_way() -> None:
     assert worst.block_from_s_m[0, -1] == pytest.approx(5.0 - 0.2 - 0.5 - 0.2)
 
 
-def test_it_may_manoeuvre_into_the_way() -> None:
+def test_reachable_set_includes_a_turn_into_the_corridor() -> None:
     """1 m beside the corridor: half of 0.5 m/s2 reaches it after 2 s."""
     worst = reached(box(5.0, 0.65 + 1.0, 0.01, 0.0), manoeuvre_mps2=0.5)
     assert not worst.inside[0, 19]
@@ -83,7 +83,7 @@ def test_it_may_manoeuvre_into_the_way() -> None:
     assert worst.block_from_s_m[0, 21] == pytest.approx(4.1 - 0.25 * 2.1**2 + 0.01 * 2.1, abs=0.01)
 
 
-def test_it_does_not_become_faster_than_obstacles_are() -> None:
+def test_reachable_set_is_bounded_by_the_maximum_obstacle_speed() -> None:
     slow = reached(box(5.0, 3.0, 0.0, 0.01), manoeuvre_mps2=5.0)
     # 1.51 m/s at the most: 2.35 m take it 1.56 s; without the bound they would take 0.97 s.
     assert not slow.inside[0, 15]
@@ -163,14 +163,14 @@ def test_spread_across_the_path_reaches_it_and_spread_along_does_not() -> None:
 
 
 @pytest.mark.parametrize("left_m", [0.65 + 0.9, -0.65 - 0.9])
-def test_who_becomes_faster_may_come_in_only_if_that_leads_towards_the_way(left_m: float) -> None:
+def test_faster_body_enters_only_if_it_heads_for_the_corridor(left_m: float) -> None:
     inwards_mps, body = -np.sign(left_m) * 0.5, box(5.0, left_m, 0.01, 0.0)
     assert grown(body, manoeuvres(surprise_mps=(0.0, inwards_mps))).inside.any()
     assert not grown(body, manoeuvres(surprise_mps=(0.0, -inwards_mps))).inside.any()
     assert not grown(body, manoeuvres(surprise_mps=(0.5, 0.0))).inside.any()
 
 
-def test_who_becomes_faster_along_the_path_comes_nearer_on_one_side_only() -> None:
+def test_body_that_accelerates_along_the_path_extends_its_reach_on_one_side_only() -> None:
     body = box(5.0, 0.0, 0.01, 0.0)
     same, on, back = (grown(body, manoeuvres(surprise_mps=(mps, 0.0))) for mps in (0.0, 0.5, -0.5))
     assert on.block_from_s_m[0, -1] == same.block_from_s_m[0, -1]

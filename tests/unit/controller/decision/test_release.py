@@ -146,7 +146,7 @@ def test_stepping_down_further_does_not_begin_the_hold_anew() -> None:
     assert (gate.now_ns - began) / 1e9 < 0.5
 
 
-def test_it_rises_to_the_least_of_the_last_moments() -> None:
+def test_released_speed_rises_to_the_minimum_of_the_last_moments() -> None:
     gate = Gate(0.0)
     gate.step(1.0)
     gate.hold(0.0, 3.0)

@@ -53,7 +53,7 @@ def gone_after_s(body: Bodies, free: FreeSpace) -> float | None:
     return gone.index(True) * PERIOD_S if True in gone else None
 
 
-def test_it_is_gone_when_its_place_was_seen_to_be_free_for_half_a_second() -> None:
+def test_body_is_gone_once_its_place_was_seen_free_for_half_a_second() -> None:
     assert gone_after_s(strip(), ALL_FREE) == pytest.approx(0.5)
 
 
@@ -80,7 +80,7 @@ def test_a_robot_that_drove_begins_anew() -> None:
 
 @pytest.mark.parametrize("distance_m", [1.3, 1.39])
 @pytest.mark.parametrize("what", ["known", "nearest"])
-def test_it_stays_where_not_all_of_its_place_is_free(distance_m: float, what: str) -> None:
+def test_body_stays_while_part_of_its_place_is_not_free(distance_m: float, what: str) -> None:
     """A surface there, or floor that was not seen, in one of its bands."""
     place = int(np.abs(BANDS - (-0.55 / 1.4)).argmin())
     known, nearest = ALL_FREE.known_m.copy(), ALL_FREE.nearest_m.copy()

@@ -58,7 +58,7 @@ def test_a_strip_is_no_body_unless_it_moves() -> None:
     assert after((obstacle(4.0, 0.1, number=6, size_m=(0.04, 0.3)),)).bodies.ids.tolist() == [6]
 
 
-def test_of_what_leaves_the_view_the_last_strip_is_not_all_that_is_remembered() -> None:
+def test_body_that_leaves_the_view_is_remembered_wider_than_its_last_strip() -> None:
     """A crate at the edge of the view, of which less and less is in it."""
     crate = obstacle(2.0, 0.9)
     known = after((crate,), (replace(crate, extent_m=np.array([0.02, 1.7, 0.2])),))
@@ -98,7 +98,7 @@ def test_depth_is_as_noisy_as_the_configuration_says() -> None:
 
 
 @pytest.mark.parametrize("unknown", [PlanarPose(np.nan, 0.0, 0.0), PlanarPose(0.0, 0.0, np.inf)])
-def test_a_scene_from_nobody_knows_where_tells_nothing(unknown: PlanarPose) -> None:
+def test_scene_without_a_known_pose_is_not_taken_in(unknown: PlanarPose) -> None:
     bench = Bench()
     bench.settle()
     decision = bench.step(replace(bench.scene(), robot_pose=unknown))

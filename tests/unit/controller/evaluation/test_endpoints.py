@@ -44,7 +44,7 @@ def test_an_outline_belongs_to_the_nearer_side() -> None:
     assert errors.error_px == pytest.approx([0.0, 0.0], abs=1e-5)
 
 
-def test_where_nothing_is_there_is_no_truth() -> None:
+def test_fragment_without_depth_has_no_endpoint_error() -> None:
     nothing = np.zeros((480, 640), np.float32)
     one = fragments([1], [[[100, 60], [100, 120]]])
     assert len(endpoint_errors(one, one, nothing, MOTION, CAMERA).error_px) == 0

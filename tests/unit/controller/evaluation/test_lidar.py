@@ -128,7 +128,7 @@ def test_a_crossing_crate_is_moving_at_its_speed_and_nothing_else_is() -> None:
     assert moving[0][1] == pytest.approx(1.0, abs=0.15)
 
 
-def test_nothing_moves_for_a_robot_that_slips_through_a_still_scene() -> None:
+def test_slip_in_a_static_scene_makes_nothing_move() -> None:
     seen = drive_and_track(0.0, yaw_slip=1.2)
     assert len(seen) >= 2
     assert not any(moving for _, _, moving in seen)

@@ -49,7 +49,7 @@ def test_total_of_two_sequences() -> None:
     assert figures.ms_per_frame == 5.0
 
 
-def test_nothing_at_all_is_not_known() -> None:
+def test_totals_of_nothing_are_unknown() -> None:
     figures = total([], [])
     assert math.isnan(figures.wrong_per_minute)
     assert math.isnan(figures.latency_median_s)

@@ -79,7 +79,7 @@ def test_a_person_who_comes_near_stops_a_turn() -> None:
     assert after(steps, stood.t_s + 0.6)[0].governed.w_radps == 0.0
 
 
-def test_nobody_turns_into_who_stands_too_near_to_be_measured() -> None:
+def test_turn_in_place_is_refused_beside_a_body_too_near_to_be_measured() -> None:
     def covered(scene: Scene, t: float) -> Scene:
         free = scene.free_space
         nothing = replace(free, nearest_m=free.nearest_m * math.inf, known_m=0.0 * free.known_m)

@@ -103,7 +103,7 @@ def test_the_views_of_a_realsense() -> None:
         assert view.degrees == pytest.approx(degrees, abs=1.0)
 
 
-def test_of_a_recording_in_place_of_the_camera_nothing_is_said(tmp_path: Path) -> None:
+def test_recording_in_place_of_the_camera_gives_no_warning(tmp_path: Path) -> None:
     content = yaml.safe_load((CONFIG_DIR / "robot-bunker.yaml").read_text())
     content["camera"] = {"kind": "replay", "folder": str(tmp_path)}
     content["path"] = {"segments": segments(1.5, 180.0)}

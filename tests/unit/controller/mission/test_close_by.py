@@ -55,7 +55,7 @@ def test_a_crate_too_near_is_told_with_place_and_need(gap_m: float, told: str, t
     assert f"close.yaml: path: {told}" in said
 
 
-def test_nothing_is_told_of_room_enough_movers_and_what_is_to_block(tmp_path: Path) -> None:
+def test_no_warning_for_enough_room_for_movers_or_for_intended_blocks(tmp_path: Path) -> None:
     assert warning(scenario(tmp_path, crate(0.25))) is None
     moving = ", motion: {steps: [{kind: go, x_m: 5.0, y_m: 4.0, speed_mps: 1.0}]}"
     assert warning(scenario(tmp_path, crate(0.1, moving))) is None
@@ -69,7 +69,7 @@ def test_a_target_too_near_to_a_wall_is_told(tmp_path: Path) -> None:
     assert "'end' stands less than margins.stop_m (0.45 m) behind the target" in said
 
 
-def test_of_many_only_three_are_told(tmp_path: Path) -> None:
+def test_warning_names_at_most_three_bodies(tmp_path: Path) -> None:
     crates = [
         f"kind: crate, name: crate {k}, x_m: {2.0 + 1.5 * k}, y_m: 0.85, length_m: 0.3" for k in range(4)
     ]

@@ -104,7 +104,7 @@ def test_odometry_counts_at_the_stamp_of_the_base(
         assert true.y_m == pytest.approx(START.y_m + x_m - 1.0)
 
 
-def test_where_the_base_does_not_say_where_it_is_nothing_is_known(ends: tuple[RemoteBody, Channel]) -> None:
+def test_pose_is_unknown_without_odometry_of_the_base(ends: tuple[RemoteBody, Channel]) -> None:
     body, control = ends
     for now_ms in range(0, 100, 20):
         control.send(step_at(now_ms, 1.0 if now_ms < 40 else math.nan, 0.0))
@@ -114,7 +114,7 @@ def test_where_the_base_does_not_say_where_it_is_nothing_is_known(ends: tuple[Re
         assert body.camera_pose(stamp_ms * MS) is None
 
 
-def test_but_not_for_ever(ends: tuple[RemoteBody, Channel]) -> None:
+def test_pose_is_not_extrapolated_for_ever(ends: tuple[RemoteBody, Channel]) -> None:
     body, control = ends
     control.send(step_at(0, 1.0, 1.5))
     assert body.body_pose(251 * MS) is None

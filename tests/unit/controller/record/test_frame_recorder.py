@@ -53,7 +53,7 @@ def test_frames_are_left_out_and_told_where_the_disk_does_not_keep_up(
     assert f"{tmp_path}: 5 frames were left out" in capsys.readouterr().err
 
 
-def test_where_time_is_simulated_none_is_left_out(tmp_path: Path) -> None:
+def test_no_frame_is_left_out_in_simulated_time(tmp_path: Path) -> None:
     with StuckWriter(tmp_path) as writer, FrameRecorder(writer, tmp_path, may_drop=False) as recorder:
         threading.Timer(0.2, writer.goes_on.set).start()
         for number in range(25):
@@ -88,7 +88,7 @@ def test_a_disk_that_is_full_is_told(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("full")
-def test_that_the_last_frames_are_lost_is_told_where_the_drive_has_ended_already(
+def test_lost_last_frames_are_reported_after_the_drive_has_ended(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Perception ends by an error always: the control process has gone, or the camera's stream."""

@@ -48,7 +48,7 @@ def test_each_is_told_once_and_the_others_go_on(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("full")
-def test_where_nothing_can_be_written_any_more_no_frame_is_kept(tmp_path: Path) -> None:
+def test_no_frame_is_kept_once_nothing_can_be_written(tmp_path: Path) -> None:
     with open_recorder(RecordingOptions(tmp_path / "o.jsonl"), AROUND, lambda _why: None) as recorder:
         assert recorder.records
         record(recorder, 1)

@@ -87,7 +87,7 @@ def test_frames_that_no_decision_comes_for_do_not_pile_up(
     )
 
 
-def test_where_nothing_is_recorded_no_frame_is_kept() -> None:
+def test_no_frame_is_kept_without_a_recording() -> None:
     with open_recorder(RecordingOptions(), AROUND) as nothing:
         recorder = RunRecorder(nothing, STRAIGHT)
         taken = PeriodicCamera(33_000_000).read(0.0)

@@ -52,7 +52,7 @@ def test_the_greatest_of_speed_and_acceleration_stay_when_less_follows() -> None
     assert tally.max_accel_mps2 == pytest.approx(0.2)
 
 
-def test_of_the_shapers_faults_the_first_is_told() -> None:
+def test_summary_tells_the_first_fault_of_the_shaper() -> None:
     faults = ShaperFaults()
     for fault in ("", "no solution", "another"):
         faults.add(fault)

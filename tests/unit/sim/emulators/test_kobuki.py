@@ -63,7 +63,7 @@ class Bench:
         return parts
 
 
-def test_it_streams_fifty_frames_a_second() -> None:
+def test_base_streams_fifty_frames_a_second() -> None:
     bench = Bench()
     assert bench.after(1000).count(b"\xaa\x55") == 51
     core = bench.frame()[1]

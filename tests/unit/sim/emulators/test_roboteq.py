@@ -41,7 +41,7 @@ class Bench:
         return reply
 
 
-def test_it_echoes_every_character_until_told_not_to() -> None:
+def test_controller_echoes_until_echo_is_switched_off() -> None:
     bench = Bench(echo=True)
     assert bench.ask(b"!M 0") == b"!M 0"
     assert bench.ask(b" 0\r") == b" 0\r+\r"

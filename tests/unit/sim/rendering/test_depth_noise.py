@@ -81,7 +81,7 @@ def test_outside_its_range_it_measures_nothing(z_m: float, valid: bool) -> None:
     assert (measured(CLEAN, z_m, frames=1) > 0).all() == valid
 
 
-def test_where_nothing_is_nothing_is_measured() -> None:
+def test_pixels_without_a_surface_have_no_depth() -> None:
     sensor = DepthSensor(NOISY, K, seed=3)
     assert not sensor.measure(np.zeros((K.height, K.width), np.float32), 0).any()
 

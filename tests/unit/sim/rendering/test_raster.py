@@ -118,7 +118,7 @@ def test_camera_turned_and_moved() -> None:
     assert raster.inverse_depth == pytest.approx(np.full((48, 64), 1.0 / 4.75), rel=1e-6)
 
 
-def test_nothing_in_view_is_nothing_drawn() -> None:
+def test_empty_view_draws_nothing() -> None:
     raster = Rasteriser(K)
     behind = Pose(EYE.rotation, np.array([10.0, 0.0, 0.5]))
     drawn = raster.draw(geometry(box((1, 1, 1), "plain/grey", (3.0, 0.0, 0.0))), behind)

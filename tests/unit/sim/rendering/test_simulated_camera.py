@@ -68,7 +68,7 @@ def test_frames_that_nobody_asked_for_are_lost() -> None:
     assert late.captured_ns == round(3 * NS / 30)
 
 
-def test_it_also_runs_on_the_machines_clock() -> None:
+def test_simulated_camera_runs_on_the_monotonic_clock_too() -> None:
     clock = MonotonicClock()
     source = SimulatedCamera(WORLD, SMALL, MOUNT, clock, lambda _: PlanarPose(0.0, 0.0, 0.0))
     before_ns = clock.now_ns()
@@ -140,6 +140,6 @@ def test_vibration_pitches_to_and_fro() -> None:
     assert pitch_deg(3 * NS // 40) == pytest.approx(3.5)
 
 
-def test_it_can_be_used_as_a_context_manager() -> None:
+def test_simulated_camera_is_a_context_manager() -> None:
     with camera() as source:
         assert source.read(timeout_s=0.0).sequence == 0

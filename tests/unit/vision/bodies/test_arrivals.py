@@ -81,7 +81,7 @@ def test_surface_uncovered_by_a_leaving_body_has_not_arrived() -> None:
     assert not arrived(memory((0, nearest(BODY, BACK))), BACK).any()
 
 
-def test_where_nothing_was_measured_nothing_was_free() -> None:
+def test_space_without_measurements_was_not_free() -> None:
     assert not arrived(memory((0, no_depth())), BODY).any()
 
 

@@ -107,7 +107,7 @@ def test_only_those_chosen_and_seen_are_looked_at() -> None:
     assert extend_to_floor(grid, hidden, nothing, np.array([True, False]), MOVER, NOISE)[0] is hidden
 
 
-def test_where_the_floor_is_not_known_nobody_reaches_down() -> None:
+def test_no_body_is_extended_down_to_an_unknown_floor() -> None:
     labels = labelled(HEAD, BODY & ~HEAD)
     for up, alike in ((LEVEL_UP, False), (None, True)):
         grid = grid_of(np.where(HEAD | BODY, 4.0, 0.0), up)

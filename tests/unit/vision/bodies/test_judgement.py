@@ -29,7 +29,7 @@ from vision.bodies.judgement import judge
 from vision.motion.motion_evidence import MotionEvidence
 
 
-def test_nothing_said_is_nothing_proved() -> None:
+def test_frame_without_evidence_proves_nothing() -> None:
     assert not rises(one())
     assert not rises(one(ACROSS))  # a fast filter that nothing stands behind
 

@@ -44,7 +44,7 @@ def test_cells_of_a_mover_are_predicted_by_its_velocity() -> None:
     np.testing.assert_array_equal(found == 1, np.roll(TWO == 1, 10, axis=1))
 
 
-def test_nothing_is_expected_where_depth_is_another() -> None:
+def test_no_surface_is_expected_at_another_depth() -> None:
     grid = grid_of(wall(6.0))
     assert not masks.predict(two_surfaces(), BOTH, NO_SHIFT, grid, AT_ORIGIN).any()
     # 0.4 m nearer is still the same surface: 0.03 + 0.25 / 9 = 0.058 against 1 / 2.6 - 1 / 3 = 0.051.
@@ -70,7 +70,7 @@ def test_tracks_that_are_gone_expect_nothing_and_the_others_have_new_numbers() -
     np.testing.assert_array_equal(found, np.where(TWO == 2, 1, 0))
 
 
-def test_where_two_are_expected_the_nearer_one_is() -> None:
+def test_nearer_of_two_expected_surfaces_wins() -> None:
     """Depths so close that both would be taken for what is measured."""
     front = plate(3.0, (-0.4, 0.4), (-0.4, 0.4)) > 0.0
     back = grid_of(np.where(front, 3.1, 0.0))
@@ -91,14 +91,14 @@ def test_where_two_are_expected_the_nearer_one_is() -> None:
     assert np.count_nonzero(found == 1) > 0.9 * np.count_nonzero(front)
 
 
-def test_nothing_known_is_nothing_expected() -> None:
+def test_without_surfaces_none_are_expected() -> None:
     none = np.empty(0, np.intp)
     assert not masks.predict(
         masks.NO_TRACK_SURFACES, none, np.empty((0, 3)), grid_of(wall(3.0)), AT_ORIGIN
     ).any()
 
 
-def test_of_two_that_are_as_near_the_last_one_has_the_cell() -> None:
+def test_last_of_two_equally_near_surfaces_gets_the_cell() -> None:
     grid, cell = grid_of(wall(3.0)), (30, 40)
     ahead = 3.0 * np.array([[grid.x[40]] * 2, [grid.y[30]] * 2, [1.0, 1.0]], np.float32)
     for owner, number in (([0, 1], 2), ([1, 0], 1)):

@@ -96,7 +96,7 @@ def test_two_alike_are_merged_once_and_not_into_each_other() -> None:
     assert len(merged(same, Body(0.05, cells=100))) == 1
 
 
-def test_of_two_that_a_part_may_belong_to_the_closer_one_comes_first() -> None:
+def test_pairs_to_merge_begin_with_the_closest() -> None:
     front, back = Body(0.0, z=3.6, width=0.6, depth=0.6, cells=900), Body(0.0, z=4.1)
     shank = Body(0.3, y=0.5, z=4.15, width=0.15, height=0.5, cells=60)
     assert merged(front, back, shank) == [(2, 1), (1, 0), (2, 0)]  # gaps of 0.03, 0.1 and 0.15 m

@@ -262,7 +262,7 @@ def test_a_new_mover_at_something_that_is_not_listed_is_told_at_once() -> None:
     assert told_moving(made) == [True]
 
 
-def test_of_two_new_movers_the_larger_one_is_listed_as_moving() -> None:
+def test_larger_of_two_new_movers_is_listed_as_moving() -> None:
     made = large_and_new()
     made.moving_s[0] = 0.1
     assert told_moving(made) == [True, False]

@@ -79,7 +79,7 @@ def test_an_overlapped_surface_alone_proves_no_motion(board_m: float, whole: boo
     assert (tracks.velocity_measured_s[0] > 0.1) == whole
 
 
-def test_of_what_is_not_seen_nothing_changes_but_how_long_it_has_been_seen() -> None:
+def test_unseen_track_changes_only_its_times() -> None:
     tracks = Tracks()
     tracks.start(np.array([[0.0, 0.0, 3.0]]), 0.2, 1.5, 0.0, 0)
     tracks.velocity_measured_s[:] = 0.4

@@ -62,7 +62,7 @@ def test_a_claim_needs_a_share_of_the_part_or_of_the_track(
     assert present[0].tolist() == [True, claims]
 
 
-def test_of_static_tracks_the_strongest_alone_stays_beside_the_movers() -> None:
+def test_only_the_strongest_static_track_stays_beside_the_movers() -> None:
     thirds = [block((10, 30), (10, 20)), block((10, 30), (20, 35)), block((10, 30), (35, 50))]
     assert vote(*thirds, mover=(False, False, True)).claims.tolist() == [[False, True, True]]
     assert vote(*thirds, mover=(True, True, True)).claims.tolist() == [[True, True, True]]
@@ -181,7 +181,7 @@ def test_a_part_that_came_goes_to_the_mover_with_the_most_votes_for_it() -> None
     np.testing.assert_array_equal(left.votes, [40, 290])
 
 
-def test_of_two_with_as_many_votes_the_first_wins() -> None:
+def test_first_of_two_tracks_with_equal_votes_wins() -> None:
     even = votes.elect(np.array([[True, True], [False, True], [False, False]]), np.full((3, 2), 7))
     np.testing.assert_array_equal(even.winner, [1, 2, 0])
     np.testing.assert_array_equal(even.votes, [7, 7, 0])

@@ -30,7 +30,7 @@ def test_a_mover_that_must_have_gone_on_loses_what_was_there_before(
 @pytest.mark.parametrize(
     ("mover", "overdue"), [((True, True), (False, True)), ((False, True), (False, False))]
 )
-def test_it_keeps_what_nothing_that_stands_claims_and_where_it_may_be_still(
+def test_mover_that_is_not_overdue_or_not_contested_keeps_its_votes(
     mover: tuple[bool, bool], overdue: tuple[bool, bool]
 ) -> None:
     expected = (PART > 0) & ~HALF, HALF

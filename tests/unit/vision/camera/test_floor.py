@@ -138,7 +138,7 @@ def test_a_camera_held_on_its_side_finds_no_floor() -> None:
     assert look(plane(tilted(10.0, 40.0), 1.0)) is not None
 
 
-def test_of_a_table_and_the_floor_the_lower_one_wins() -> None:
+def test_floor_wins_over_a_table() -> None:
     up = tilted(20.0, 0.0)
     table_m, floor_m = plane(up, 0.45), plane(up, 1.2)
     left = (X < 0.285)[None, :] & (table_m > 0.0)

@@ -53,7 +53,7 @@ def test_samples_that_came_with_the_frame_before_count() -> None:
         np.testing.assert_array_equal(turn[1:], 0.0)
 
 
-def test_over_frames_that_are_not_followed_they_are_kept() -> None:
+def test_gyro_samples_are_kept_over_skipped_frames() -> None:
     memory = GyroMemory()
     for begin_ms in range(0, 400, 100):
         memory.add(samples(range(begin_ms, begin_ms + 100, 5), lambda t_s: 0.5))

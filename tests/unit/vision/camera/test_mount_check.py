@@ -98,12 +98,12 @@ def test_a_table_over_a_floor_in_its_place_is_a_table() -> None:
     assert judged(*[nearest(floor(), table)] * 8) is GOOD
 
 
-def test_where_no_floor_is_seen_nothing_is_said() -> None:
+def test_mounting_is_not_judged_without_a_visible_floor() -> None:
     before_a_wall = nearest(wall(1.0), plate(0.9, (-1.0, 1.0), (-1.0, 1.0)))
     assert judged(*[before_a_wall, no_depth()] * 4) is GOOD
 
 
-def test_once_it_was_found_in_its_place_it_is_looked_at_every_five_seconds() -> None:
+def test_confirmed_mounting_is_checked_every_five_seconds() -> None:
     check = MountCheck()
     assert judged(*[floor()] * 5, check=check) is GOOD
     # Knocked askew: three looks, five seconds until the first of them, half a second to the others.

@@ -237,7 +237,7 @@ def test_an_edge_beside_the_way_is_told_where_it_is(pitch_deg: float, foot_m: fl
     assert 0.495 <= outer.max() <= 0.50 + 0.06
 
 
-def test_low_in_a_steep_view_what_is_beside_the_bands_is_in_the_outermost_one() -> None:
+def test_cells_beside_the_bands_of_a_steep_view_count_in_the_outermost_band() -> None:
     steep = CameraMount(0.0, 0.0, 1.0, math.radians(30.0))
     # At 0.9 m the view is 0.76 m wide to the side; the bands end at 0.58 m.
     post = box(vector(0.92, -0.68, 0.0), vector(0.05, 0.06, 0.12), 10)
@@ -269,7 +269,7 @@ def test_the_whole_view_is_scanned_at_848_pixels_too() -> None:
 
 
 @pytest.mark.parametrize(("height_m", "pitch_deg"), [(0.6, 4.0), (1.1, 15.0), (0.3, 0.0)])
-def test_where_the_floor_comes_into_view_is_told(height_m: float, pitch_deg: float) -> None:
+def test_distance_at_which_the_floor_comes_into_view_is_reported(height_m: float, pitch_deg: float) -> None:
     """By the middle of the lowest row of cells, somewhat above the image's edge."""
     mount = CameraMount(0.0, 0.0, height_m, math.radians(pitch_deg))
     down_rad = math.atan((VGA.height - 0.5 - VGA.cy) / VGA.fy) + mount.pitch_rad

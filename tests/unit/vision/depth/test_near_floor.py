@@ -120,7 +120,7 @@ def test_a_bump_teaches_no_least_depth() -> None:
     assert told(measured_from(0.1), 200) == 0.0
 
 
-def test_where_the_lowest_row_shows_floor_there_is_nothing_to_excuse() -> None:
+def test_near_floor_is_measurable_if_the_lowest_row_shows_floor() -> None:
     learner = NearFloor(CONFIG.min_depth_m)
     assert learner.measurable_from_m(make_grid(seen_by(LOW), CONFIG, LOW), True) == 0.0
     high = CameraMount(0.45, 0.0, 0.6, 0.07)

@@ -243,7 +243,7 @@ def test_labels_spread_to_the_nearest_cells_of_the_mask_only() -> None:
     assert connected.spread_labels(empty, mask) is empty
 
 
-def test_nothing_measured_is_nothing() -> None:
+def test_region_without_measurements_is_empty() -> None:
     grid = grid_of(no_depth())
     assert connected.components(grid, grid.valid)[0] == 0
     assert regions.measure(grid, labelled(), 1).cells.tolist() == [0]

@@ -170,7 +170,7 @@ def test_surfaces_are_expected_where_they_went_and_only_there() -> None:
     assert not gone[:6].any()
 
 
-def test_of_two_surfaces_in_one_cell_the_nearer_one_is_expected() -> None:
+def test_nearer_of_two_surfaces_in_one_cell_is_expected() -> None:
     near, far = flat(3.0), flat(3.1)
     labels = np.ones(SHAPE, np.int32)
     front = surfaces(grid_of(near), labels, np.array([1]), IDENTITY)

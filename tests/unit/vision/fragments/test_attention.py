@@ -90,7 +90,7 @@ def test_fragment_at_another_depth_is_not_on_the_body(frame: RgbdFrame) -> None:
     assert look(frame, one_body(depth_m=1.5)) == 0
 
 
-def test_where_there_is_a_fragment_already_there_is_no_second_one(frame: RgbdFrame) -> None:
+def test_no_second_fragment_is_found_where_one_exists(frame: RgbdFrame) -> None:
     present = find(frame).ends_px
     assert len(present)
     more = find(frame, present).ends_px
@@ -118,7 +118,7 @@ def test_a_plain_body_without_edges_gets_none() -> None:
     assert look(record(bare, drive(), 1).frames[0], one_body()) == 0
 
 
-def test_where_edges_have_no_corners_nobody_is_a_witness() -> None:
+def test_edges_without_corners_give_no_fragment() -> None:
     """Along level stripes an end is held by noise alone; chequers in the same place are as good as any."""
     row, column = np.indices((9, 5))
     for bright, found in ((row % 2 == 0, False), ((row + column) % 2 == 0, True)):
@@ -176,7 +176,7 @@ def test_the_urgent_one_comes_first_then_who_has_waited_for_longest(frame: RgbdF
     assert look(frame, equal, attention, 2.0 * FRAME_S) == 0  # neither has waited for long
 
 
-def test_of_two_that_have_waited_as_long_the_larger_comes_first(frame: RgbdFrame) -> None:
+def test_larger_of_two_equally_waiting_bodies_comes_first(frame: RgbdFrame) -> None:
     """Whichever comes first in the list; the small one is nowhere near a fragment."""
     large = one_body(number=7)
     small = replace(one_body(number=9, depth_m=1.5), box_px=np.array([[281.0, 178.0, 301.0, 220.0]]))
@@ -200,7 +200,7 @@ def asked_for(made: Tracks) -> NeedsFragments:
     ("moving", "fragments", "more"),
     [(False, 3, True), (False, 4, False), (True, 1, True), (True, 2, False)],
 )
-def test_more_is_wanted_of_whom_too_few_tell(moving: bool, fragments: int, more: bool) -> None:
+def test_bodies_with_too_few_fragments_want_more(moving: bool, fragments: int, more: bool) -> None:
     made = tracks([(0.0, 0.0, 4.0)])
     made.moving[0], made.fragments[0] = moving, fragments
     assert len(asked_for(made).ids) == more

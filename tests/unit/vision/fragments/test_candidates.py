@@ -44,7 +44,7 @@ def test_the_best_held_ones_come_first() -> None:
     np.testing.assert_array_equal(ends[:, 0], [(8, 8), (5, 5), (2, 2)])
 
 
-def test_of_two_at_one_place_the_better_held_one_stays() -> None:
+def test_better_trackable_of_two_fragments_at_one_place_stays() -> None:
     """It is held as well as the weaker one of its ends is."""
     shared = between((4, 4), (8, 8), (8, 8), (12, 8))
     np.testing.assert_array_equal(found(shared), [[(8, 8), (12, 8)]])
@@ -53,7 +53,7 @@ def test_of_two_at_one_place_the_better_held_one_stays() -> None:
     np.testing.assert_array_equal(found(chain), [[(12, 8), (12, 9)]])
 
 
-def test_where_a_fragment_is_there_is_no_second_one() -> None:
+def test_candidate_beside_an_existing_fragment_is_dropped() -> None:
     segments = between((2, 2), (3, 2), (8, 8), (9, 8))
     ends, _ = trackable_segments(chequers(), segments, NOBODY, 12.0)
     for place in ends.reshape(-1, 2):
@@ -83,7 +83,7 @@ def test_weakly_held_ones_are_left_out_where_that_is_asked_for() -> None:
     assert len(found(both, least=1.01 * smaller)) == 1
 
 
-def test_nothing_comes_of_nothing() -> None:
+def test_no_candidates_give_no_fragments() -> None:
     ends, tensor = trackable_segments(chequers(), NOBODY, between((2, 2), (3, 2)), 12.0)
     assert ends.shape == (0, 2, 2)
     assert tensor.shape == (0, 2, 3)

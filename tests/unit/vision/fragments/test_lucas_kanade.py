@@ -50,7 +50,7 @@ def inner_points(seed: int, count: int, margin_px: float) -> NDArray[np.float32]
 
 
 @pytest.mark.parametrize("side", [5, 11, 14, 21, 41])
-def test_it_finds_what_opencv_finds(side: int) -> None:
+def test_points_agree_with_those_of_opencv(side: int) -> None:
     before, pixels = pattern(1), inner_points(2, 200, 30.0)
     now = moved(before, 0.8, -0.6)
     guess = pixels + np.array([0.3, 0.2], np.float32)
@@ -63,7 +63,7 @@ def test_it_finds_what_opencv_finds(side: int) -> None:
     assert np.quantile(off_px, 0.98) < 0.02  # the step at which both end
 
 
-def test_it_is_nearer_to_the_truth_than_opencv() -> None:
+def test_points_are_nearer_to_the_truth_than_those_of_opencv() -> None:
     """OpenCV rounds the grey levels between pixels."""
     before, pixels = pattern(3), inner_points(4, 300, 20.0)
     now, truth = moved(before, 0.31, 0.17), np.array([0.31, 0.17], np.float32)

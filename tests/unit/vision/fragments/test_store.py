@@ -85,7 +85,7 @@ def test_before_is_the_frame_before() -> None:
     np.testing.assert_allclose(last.far_m - last.depth_m, 0.25)
 
 
-def test_nothing_before_a_break_is_looked_at() -> None:
+def test_history_before_a_break_is_not_used() -> None:
     store = FragmentStore()
     add(store, 2)
     for frame in range(5):

@@ -81,6 +81,6 @@ def test_fragments_with_different_velocities_are_in_different_groups() -> None:
     assert grouped(here, [[0.0, -0.4, 0.0], [0.0, 0.39, 0.0]]) == [0, 1]
 
 
-def test_nobody_is_no_group_and_one_is_a_group() -> None:
+def test_groups_of_no_end_and_of_one_end() -> None:
     assert grouped([]) == []
     assert grouped([[0.0, 0.0, 4.0]]) == [0]

@@ -64,7 +64,7 @@ def test_unknown_depth_is_five_metres_and_what_the_camera_passed_stays_finite() 
     )
 
 
-def test_of_no_fragments_none_are_expected() -> None:
+def test_no_fragments_give_no_expected_positions() -> None:
     assert expected_px(FragmentStore(), np.empty((0, 3)), STILL, 0.1, CAMERA).shape == (0, 2)
 
 
@@ -91,7 +91,7 @@ def test_known_motion_is_looked_up_by_fragment_id() -> None:
     assert not velocity[[1, 2, 4]].any()
 
 
-def test_nothing_is_known_before_or_of_nobody() -> None:
+def test_motion_is_unknown_before_the_first_frame_and_without_an_obstacle() -> None:
     ids = np.array([3, 5], np.int64)
     for before in (None, told([], [], [])):
         moving, velocity = known_motion(ids, before)

@@ -71,7 +71,7 @@ def test_squared_sigmas_are_those_of_a_general_solver() -> None:
         np.testing.assert_allclose(found.rest[k], plane.T @ across, atol=1e-12)
 
 
-def test_of_no_tracks_there_is_nothing_to_split() -> None:
+def test_no_tracks_give_nothing_to_split() -> None:
     found = decompose(np.empty((4, 0, 3)), np.empty((4, 0, 3, 3)), np.empty((0, 3)), UP)
     assert found.level.shape == (4, 0)
     assert found[0].rest.shape == (0, 3)

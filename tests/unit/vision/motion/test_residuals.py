@@ -75,7 +75,7 @@ def test_averaged_depth_of_a_mover_gives_its_speed_along_the_axis_without_bias(s
     assert (motions[-1].depth_step_m / motions[-1].lag_s / speed_mps > 1.4).all()
 
 
-def test_of_what_stands_depth_and_image_say_nothing_else() -> None:
+def test_depth_and_image_agree_on_a_static_end() -> None:
     for motion in follow(going((0.0, 0.0, 0.0), 12)).motions:
         np.testing.assert_allclose(motion.depth_step_m, 0.0, atol=1e-5)
         np.testing.assert_allclose(motion.residual_m, 0.0, atol=1e-4)
@@ -242,7 +242,7 @@ def test_chi2_by_numbers(
     assert module._squared_sigmas(miss, covariance, effect) == pytest.approx(expected)
 
 
-def test_of_no_fragments_there_are_no_residuals() -> None:
+def test_no_fragments_give_no_residuals() -> None:
     store = FragmentStore()
     store.commit(FRAME_NS, STILL, CAMERA, np.zeros(2))
     anchor = store.anchors(2 * FRAME_NS, WINDOW_S)

@@ -85,6 +85,6 @@ def test_points_of_weight_0_do_not_count_even_if_they_are_nan() -> None:
     assert not table[:, 1].any()
 
 
-def test_of_no_points_there_are_no_equations() -> None:
+def test_no_points_give_no_equations() -> None:
     nothing = points(np.empty((0, 3)), np.empty((0, 2)), 1.0)
     assert normal_equations(nothing, np.empty(0)).shape == (12, 0)

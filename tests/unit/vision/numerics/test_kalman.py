@@ -146,7 +146,7 @@ def test_several_tracks_are_updated_as_by_the_equations_of_a_general_filter(firs
         np.testing.assert_allclose(spread[k], (np.eye(6) - gain @ select) @ covariance[k], atol=1e-9)
 
 
-def test_of_no_tracks_there_is_nothing_to_filter() -> None:
+def test_no_tracks_give_nothing_to_filter() -> None:
     state, covariance = np.empty((0, 6)), np.empty((0, 6, 6))
     assert kalman.predict(state, covariance, 0.1, 0.3)[1].shape == (0, 6, 6)
     assert kalman.update(state, covariance, np.empty((0, 3)), np.empty((0, 3, 3)), 3)[0].shape == (0, 6)
