@@ -27,7 +27,7 @@ from vision.bodies import (
 )
 from vision.bodies.adoption import adopt, inherited
 from vision.bodies.arrivals import Changes, ViewMemory, arriving
-from vision.bodies.judgement import judge
+from vision.bodies.judgement import IMPLAUSIBLE_SPEED_FACTOR, judge
 from vision.bodies.tracks import Tracks
 from vision.depth import connected, occlusion, regions
 from vision.depth.connected import IntGrid
@@ -107,6 +107,8 @@ class Tracker:
         sightings.update_from_surfaces(
             tracks, detection, occlusion.with_occlusion(grid, labels, measured), self._config.depth_noise
         )
+        max_mps = self._config.motion.max_speed_mps
+        sightings.forget_implausible(tracks, IMPLAUSIBLE_SPEED_FACTOR * max_mps, max_mps)
         if tracks.overhead.any():
             tracks.overhead &= ~births.reaching_down(grid, whole, len(tracks), self._body_height_m)
         owner = adopt(tracks, detection, whole, owner, self._config.depth_noise)

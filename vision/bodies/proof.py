@@ -16,6 +16,7 @@ from hal.compiled import compiled, inlined
 from hal.types import Flags, FloatArray, Vector
 from vision.bodies.proof_rules import (
     ENDS_ACROSS,
+    EVEN_CELLS,
     STANDING_SHARE,
     Ends,
     Opinion,
@@ -102,15 +103,17 @@ def _proofs(
         filtered = _entry(velocity, covariance, parts, _FILTERED, t)
         frame = _entry(velocity, covariance, parts, _FRAME, t)
         centre = _entry(velocity, covariance, parts, _SURFACE, t)
+        ends, cells, size_m = seen.ends[t], seen.cells[t], seen.size_m[t]
         opinion = Opinion(
             second.denies_along[t],
             second.denies_across[t],
-            second.confirms_along[t],
+            second.confirms_along[t] and cells >= EVEN_CELLS,
             second.confirms_across[t],
         )
-        ends, cells, size_m = seen.ends[t], seen.cells[t], seen.size_m[t]
         alike = seen.agreement[t] * ends
-        agreeing = alike if seen.agreement[t] >= _MIN_AGREEMENT else 0.0
+        # Ends that agree on an impossible velocity agree on a mistake, mostly of their depth.
+        believed = seen.agreement[t] >= _MIN_AGREEMENT and frame.speed_mps <= fastest_mps
+        agreeing = alike if believed else 0.0
         track_ends = Ends(ends, agreeing, seen.restless[t], seen.restless_s[t])
         wander_mps = _WANDER * seen.view_radps[t] * size_m + seen.growth_mps[t]
         surface = Surface(cells, size_m, seen.velocity_measured_s[t], wander_mps, seen.depth_sigma_m[t])

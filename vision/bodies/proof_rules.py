@@ -25,7 +25,7 @@ _MEASURED_ACROSS_S = 0.25  # static surfaces seldom show a false speed across th
 _MEASURED_ALONG_S = 0.5  # somewhat longer along it, where neighbours share the noise of depth
 _CLEAR_WAY = 4.0  # times the depth noise of one pixel: shared noise never shows so large a displacement
 _MEASURED_FRAMES = 2.5  # frame intervals: at least three frames at a low frame rate
-_EVEN_CELLS = 48  # fewer cells lie on 2 or 3 patches of depth noise, and move back and forth with them
+EVEN_CELLS = 48  # fewer cells lie on 2 or 3 patches of depth noise, and move back and forth with them
 _COMPACT_M = 2.2  # a tall person; larger things are seen in part only, and their centre wanders
 
 
@@ -42,7 +42,10 @@ class Velocity(NamedTuple):
 
 
 class Opinion(NamedTuple):
-    """What the surface's velocity says of the fragments' velocity; see SecondOpinion."""
+    """What the surface's velocity says of the fragments' velocity; see SecondOpinion.
+
+    confirms_along is False for a surface of fewer than EVEN_CELLS.
+    """
 
     denies_along: bool
     denies_across: bool
@@ -164,7 +167,7 @@ def by_surface(centre: Velocity, seen: Surface, least_mps: float, dt_s: float, t
     far = abs(centre.value) * seen.velocity_measured_s >= _CLEAR_WAY * seen.depth_sigma_m
     long_s = max(_MEASURED_ACROSS_S if far else _MEASURED_ALONG_S, frames_s)
     clear = centre.across > threshold and seen.velocity_measured_s >= max(_MEASURED_ACROSS_S, frames_s)
-    even = seen.cells >= _EVEN_CELLS
+    even = seen.cells >= EVEN_CELLS
     clear = clear or (even and centre.along > threshold and seen.velocity_measured_s >= long_s)
     return clear and seen.size_m <= _COMPACT_M and centre.speed_mps > least_mps + seen.wander_mps
 

@@ -30,6 +30,7 @@ from vision.depth.connected import MIN_PART_CELLS
 from vision.depth.depth_noise import depth_sigma_of
 from vision.depth.regions import Regions
 from vision.detection import Detection
+from vision.numerics import kalman
 from vision.numerics.pose_axes import inner_point, outer_point
 
 # Standard deviation of the centroid of a very small surface: the width of a cell 2.3 m away.
@@ -66,6 +67,22 @@ def update_from_surfaces(tracks: Tracks, detection: Detection, measured: Regions
     growth_mps = change * measured.extent_m[:, 0] / _AREA_MEMORY_S
     tracks.growth_mps = np.where(kind != _NOT_VISIBLE, growth_mps, tracks.growth_mps)
     _note_view(tracks, detection, measured, kind)
+
+
+def forget_implausible(tracks: Tracks, fastest_mps: float, sigma_mps: float) -> None:
+    """Forget velocities faster than fastest_mps of tracks that are not known to move.
+
+    They come from a surface that jumped. While a filter forgets one slowly, it passes through all plausible
+    velocities, and each would be proof of motion. sigma_mps: of an unknown velocity, per axis.
+    """
+    for state, covariance in (
+        (tracks.state, tracks.covariance),
+        (tracks.surface_state, tracks.surface_covariance),
+    ):
+        implausible = np.square(state[:, 3:]).sum(axis=1) > fastest_mps**2
+        wild = (implausible & ~tracks.moving).nonzero()[0]
+        if len(wild):
+            kalman.forget_velocity(state, covariance, wild, sigma_mps)
 
 
 def _note_view(tracks: Tracks, detection: Detection, measured: Regions, kind: NDArray[np.intp]) -> None:

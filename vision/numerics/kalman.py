@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from hal.compiled import compiled, inlined
-from hal.types import FloatArray
+from hal.types import FloatArray, Integers
 
 _VERTICAL_S = 0.1  # time constant of a vertical velocity: limbs have one, bodies do not
 _UNKNOWNS = 6  # position, then velocity
@@ -72,6 +72,16 @@ def reset_position(
     new_covariance[:, :3, :3] = noise
     new_covariance[:, :3, 3:] = new_covariance[:, 3:, :3] = 0.0
     return new_state, new_covariance
+
+
+def forget_velocity(state: FloatArray, covariance: FloatArray, index: Integers, sigma_mps: float) -> None:
+    """Set the velocities of tracks index (K,) to 0 with a standard deviation of sigma_mps per axis, in place.
+
+    state (T, 6), covariance (T, 6, 6). The positions stay as they are.
+    """
+    state[index, 3:] = 0.0
+    covariance[index, :3, 3:] = covariance[index, 3:, :3] = 0.0
+    covariance[index, 3:, 3:] = sigma_mps**2 * np.eye(3)
 
 
 @inlined

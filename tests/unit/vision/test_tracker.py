@@ -99,6 +99,16 @@ def test_a_surface_that_stands_is_listed_from_the_third_sight_on_and_never_moves
     np.testing.assert_allclose(still.velocity_mps, 0.0, atol=0.02)
 
 
+def test_a_velocity_that_nothing_has_is_not_kept() -> None:
+    """As a surface that jumped leaves it behind; 1.6 times 1.5 m/s are possible."""
+    tracker = Tracker(PerceptionConfig(), body_height_m=1.5, clearance_m=0.05)
+    for k in range(6):
+        tracker._tracks.state[:, 3] = tracker._tracks.surface_state[:, 3] = 8.0
+        percept = tracker.step(detection(grid_of(walker(0.3)), k), None)
+    (still,) = percept.scene.obstacles
+    assert np.linalg.norm(still.velocity_mps) <= 1.6 * 1.5  # 6.2 m/s if it is kept
+
+
 def test_a_person_who_leaves_a_table_is_the_mover_and_not_the_table() -> None:
     """They touched, one connected part; 0.37 s after his first step he is 0.29 m away from it."""
     stood, steps = 12, 11

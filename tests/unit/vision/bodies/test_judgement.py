@@ -109,6 +109,26 @@ def test_fragments_and_surface_that_say_the_same_prove_together(direction: Speed
     assert not rises(by_fragments(slow, 2, **{**both, "own_covariance": covariance(0.06)}, **agrees))  # 2.6
 
 
+def shared(velocity: Speed, **changes: Any) -> MotionEvidence:
+    """Two ends and the surface say the same of 0.4 m/s, with just enough proof together."""
+    both: dict[str, Any] = {"covariance": covariance(0.0131), "own_covariance": covariance(0.045)}
+    return by_fragments(velocity, 2, **{**both, **surface(velocity, 0.02), **changes})
+
+
+def test_a_surface_of_a_few_cells_confirms_no_motion_along_the_line_of_sight() -> None:
+    """They move along it together, with the depth noise that they share."""
+    assert rises(shared((0.0, 0.0, -0.4), cells=np.array([48])))
+    assert not rises(shared((0.0, 0.0, -0.4), cells=np.array([47])))
+    assert rises(shared((0.4, 0.0, 0.0), cells=np.array([20])))
+
+
+@pytest.mark.parametrize(("own_mps", "proves"), [(2.3, True), (2.5, False)])
+def test_ends_that_agree_on_an_impossible_velocity_confirm_nothing(own_mps: float, proves: bool) -> None:
+    """1.6 times 1.5 m/s are 2.4; 5.3 / 1.5 is more than the 3 squared sigmas that a frame must have."""
+    own = {"own_velocity": np.array([[0.0, 0.0, -own_mps]]), "own_covariance": covariance(1.5)}
+    assert rises(shared((0.0, 0.0, -0.4), **own)) == proves
+
+
 def test_a_surface_seen_long_enough_without_a_break_proves_by_itself() -> None:
     assert rises(by_surface(ACROSS, 0.25))
     assert not rises(by_surface(ACROSS, 0.2))

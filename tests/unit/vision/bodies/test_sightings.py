@@ -98,3 +98,22 @@ def test_unseen_track_changes_only_its_times() -> None:
         nobody, detection(grid, 1), regions.measure(grid, np.zeros_like(few), 0), DepthNoise()
     )
     assert len(nobody) == 0
+
+
+def test_a_velocity_that_nothing_has_is_forgotten_unless_it_is_that_of_a_known_mover() -> None:
+    """2.5 m/s where 2.4 are possible: at once, not on a way through all that is possible."""
+    tracks = Tracks()
+    tracks.start(np.zeros((3, 3)), 0.2, 1.5, 0.0, 0)
+    tracks.covariance[:, 0, 3] = tracks.covariance[:, 3, 0] = 0.02
+    tracks.covariance[:, 3:, 3:] = tracks.surface_covariance[:, 3:, 3:] = 0.04 * np.eye(3)
+    tracks.state[:, :4] = tracks.surface_state[:, :4] = (1.0, 0.5, 8.0, 0.0)
+    tracks.state[:, 5] = -2.5, -2.3, -2.5
+    tracks.surface_state[:, 5] = -2.3, -2.5, -2.5
+    tracks.moving[2] = True
+    sightings.forget_implausible(tracks, 2.4, 1.5)
+    assert tracks.state[:, 5].tolist() == [0.0, -2.3, -2.5]
+    assert tracks.surface_state[:, 5].tolist() == [-2.3, 0.0, -2.5]
+    np.testing.assert_array_equal(tracks.state[:, :3], [[1.0, 0.5, 8.0]] * 3)
+    np.testing.assert_allclose(tracks.covariance[0], np.diag([0.04] * 3 + [2.25] * 3))
+    np.testing.assert_allclose(tracks.covariance[1, 3:, 3:], 0.04 * np.eye(3))
+    np.testing.assert_allclose(tracks.surface_covariance[:, 5, 5], [0.04, 2.25, 0.04])

@@ -163,6 +163,22 @@ def test_a_gap_of_a_stereo_camera_beside_a_nearer_surface_counts_as_hidden() -> 
         assert measured.whole.tolist() == [whole, True]
 
 
+@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize(("blind", "visible"), [(1, False), (6, False), (7, True)])
+def test_a_part_that_reaches_the_blind_band_of_a_stereo_camera_is_cut(
+    blind: int, visible: bool, mirrored: bool
+) -> None:
+    """Part 1 begins where depth does, in one row only; part 2 stands farther in."""
+    depth_m = np.zeros((ROWS, COLUMNS))
+    depth_m[20, blind : blind + 9] = depth_m[21:40, blind + 3 : blind + 9] = 3.0
+    depth_m[20:40, blind + 20 : blind + 30] = 4.0
+    seen = np.ascontiguousarray(depth_m[:, ::-1]) if mirrored else depth_m
+    grid, labels = grid_of(seen), labelled(seen == 3.0, seen == 4.0)
+    measured = regions.measure(grid, labels, 2)
+    assert measured.sides_visible.tolist() == [True, True]
+    assert occlusion.with_occlusion(grid, labels, measured).sides_visible.tolist() == [visible, True]
+
+
 def test_the_end_of_a_row_does_not_hide_the_beginning_of_the_next() -> None:
     far = np.zeros((ROWS, COLUMNS))
     far[10:40, COLUMNS - 8 :] = 5.0
