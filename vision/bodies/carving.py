@@ -37,6 +37,7 @@ from vision.depth.regions import Regions
 from vision.detection import Detection
 from vision.motion import candidates
 from vision.motion.least_squares import FragmentVelocities
+from vision.numerics.order import median
 
 # Score at the start. It is used up in 0.09 s where nothing speaks for motion, in 0.6 s where something does.
 SUSPECT_EVIDENCE = 0.3
@@ -144,19 +145,36 @@ def _cut_back(
 ) -> IntGrid:
     """labels (h, w) with overgrown movers (T,) reduced to the cells that move (moving_cells, (h, w)).
 
-    They have grown over furniture they move along. The rest of each begins as a static track.
+    They have grown over furniture they move along. The rest of each begins as a static track. What is as
+    close to the moving cells as parts of one body are is not the rest: a leg would stand as a track of its own.
     """
     for track in overgrown.nonzero()[0].tolist():
         own = labels == track + 1
         widened = np.asarray(cv2.dilate((moving_cells & own).view(np.uint8), _BLOCK), np.uint8)
         kept = widened.view(np.bool_) & own
-        rest = own & ~kept
-        if min(np.count_nonzero(kept), np.count_nonzero(rest)) < MIN_CELLS:
+        if np.count_nonzero(kept) < MIN_CELLS:
+            continue
+        rest = own & ~kept & ~_of_one_body(detection.grid, own, kept, config.depth_noise)
+        if np.count_nonzero(rest) < MIN_CELLS:
             continue
         one = regions.measure(detection.grid, rest.astype(np.int32), 1)
         _start(tracks, detection, one, 0.0, config)
         labels = np.where(rest, np.int32(len(tracks)), labels)
     return labels
+
+
+def _of_one_body(grid: DepthGrid, own: BoolGrid, moving: BoolGrid, noise: DepthNoise) -> BoolGrid:
+    """(h, w) cells of own that are, from above, within half the width of a body of the middle of those moving."""
+    cells = own.ravel().nonzero()[0]
+    x_m, _, z_m = grid.points(cells)
+    of_moving = moving.ravel().take(cells)
+    middle_x_m, middle_z_m = median(x_m[of_moving]), median(z_m[of_moving])
+    sigma_m = depth_sigma_of(middle_z_m, noise.floor_m, noise.quadratic_per_m)
+    close = np.abs(x_m - middle_x_m) <= 0.5 * SINGLE_WIDTH_M
+    close &= np.abs(z_m - middle_z_m) <= 0.5 * SINGLE_WIDTH_M + 2.0 * sigma_m
+    result = np.zeros(own.shape, np.bool_)
+    result.ravel()[cells[close]] = True
+    return result
 
 
 def _start(
