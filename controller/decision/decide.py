@@ -80,7 +80,8 @@ class DecisionMaker:
 
     def step(self, at: Situation) -> Decision:
         """The decision for at.now_ns."""
-        fault = self._input_fault(at)
+        before_ns, self._now_ns = self._now_ns, at.now_ns
+        fault = self._input_fault(at, before_ns)
         if fault:
             return self._halt(fault, at.v_mps, at.now_ns)
         path, on_path, v_mps, now_ns = at.path, at.on_path, max(at.v_mps, 0.0), at.now_ns
@@ -97,11 +98,11 @@ class DecisionMaker:
         limits += self._speed_limits.limits(known, on_path.s_m, motion, base_mps, now_ns / NS_PER_S)
         return self._conclude(on_way, limits, motion, now_ns)
 
-    def _input_fault(self, at: Situation) -> str:
+    def _input_fault(self, at: Situation, before_ns: int | None) -> str:
+        """Why the inputs cannot be relied on; "" if they can. before_ns: time of the step before."""
         pose, on_path, v_mps, now_ns = at.pose, at.on_path, at.v_mps, at.now_ns
-        before, self._now_ns = self._now_ns, now_ns
-        if before is not None and now_ns < before:
-            return f"time went back by {(before - now_ns) / NS_PER_S:.3f} s"
+        if before_ns is not None and now_ns < before_ns:
+            return f"time went back by {(before_ns - now_ns) / NS_PER_S:.3f} s"
         on_floor = pose.x_m + pose.y_m + pose.heading_rad
         along = on_path.s_m + on_path.d_m + on_path.heading_rad
         if not math.isfinite(on_floor + along + v_mps + at.a_mps2):
@@ -134,10 +135,10 @@ class DecisionMaker:
         raw_mps = self._start_or_creep(least, motion)
         blocked = raw_mps <= 0.0
         waits = self._start_delay.step(blocked, blocked and least.reason.rule in STANDING_RULES, now_ns)
-        watched: Reason | None = None
+        limited: Reason | None = None
         let_go_mps = max(motion.v_mps - motion.a_mps2**2 / (2.0 * self._comfort.jerk_mps3), 0.0)
         if raw_mps < min(top_mps, on_way.speed_mps):
-            self._last = watched = _reason_for(least, raw_mps)
+            self._last = limited = _reason_for(least, raw_mps)
         # Something that comes and goes does not stop a robot that still rolls, but lets it get no faster.
         rolling_mps = let_go_mps if let_go_mps >= self._config.release.creep_mps else 0.0
         released_mps = min(raw_mps, rolling_mps if waits else top_mps)
@@ -146,7 +147,7 @@ class DecisionMaker:
         if on_way.speed_mps <= gated_mps:
             reason = on_way.reason
         else:
-            reason = self._reason(watched or _reason_for(least, raw_mps), raw_mps, gated_mps)
+            reason = self._reason(limited or _reason_for(least, raw_mps), raw_mps, gated_mps)
         self._emergency = self._brakes_hard(limits, min(raw_mps, on_way.speed_mps), motion)
         self._note_stuck(target_mps, motion, reason, now_ns)
         action = self._action(target_mps, motion.v_mps)
@@ -174,23 +175,23 @@ class DecisionMaker:
             least = min(least, max(release.creep_mps, self._config.prediction.beside_mps))
         return limit.speed_mps if limit.speed_mps >= least else 0.0
 
-    def _reason(self, watched: Reason, raw_mps: float, gated_mps: float) -> Reason:
+    def _reason(self, limiting: Reason, raw_mps: float, gated_mps: float) -> Reason:
         """The reason for a target below what the path allows.
 
-        watched: reason of the least limit. While the release gate holds the target back, the reason is the
+        limiting: reason of the least limit. While the release gate holds the target back, the reason is the
         last thing that limited it.
         """
         if gated_mps >= raw_mps or self._last is None:
-            return watched
+            return limiting
         held = self._last
         return Reason(
             "release",
             f"not yet faster after: {held.sentence}",
             held.obstacle_id,
-            watched.distance_m,
-            watched.closing_mps,
-            watched.required_m,
-            watched.margin_m,
+            limiting.distance_m,
+            limiting.closing_mps,
+            limiting.required_m,
+            limiting.margin_m,
         )
 
     def _brakes_hard(self, limits: list[Limit], allowed_mps: float, motion: Motion) -> bool:

@@ -219,7 +219,7 @@ class ChassisDriver(ABC):
         self._arming = arming.step(self._arming, self._evidence(now_ns), self._limits)
 
     def _evidence(self, now_ns: int) -> Evidence:
-        feedback = self._reported
+        feedback, late_answer = self._reported, self._late_answer()
         return Evidence(
             now_ns=now_ns,
             link_error=self._link_error,
@@ -232,8 +232,8 @@ class ChassisDriver(ABC):
             or self._following.sentence,
             standing=feedback.standing,
             command_is_zero=is_zero(self._requested),
-            silence_hint=self._late_answer() or self._silence_hint(),
-            late_answer=self._late_answer(),
+            silence_hint=late_answer or self._silence_hint(),
+            late_answer=late_answer,
             resettable=self._resettable(),
         )
 

@@ -146,7 +146,7 @@ def _cut_back(
     """labels (h, w) with overgrown movers (T,) reduced to the cells that move (moving_cells, (h, w)).
 
     They have grown over furniture they move along. The rest of each begins as a static track. What is as
-    close to the moving cells as parts of one body are is not the rest: a leg would stand as a track of its own.
+    close to the moving cells as parts of one body are does not: a leg would stand as a track of its own.
     """
     for track in overgrown.nonzero()[0].tolist():
         own = labels == track + 1
@@ -164,7 +164,7 @@ def _cut_back(
 
 
 def _of_one_body(grid: DepthGrid, own: BoolGrid, moving: BoolGrid, noise: DepthNoise) -> BoolGrid:
-    """(h, w) cells of own that are, from above, within half the width of a body of the middle of those moving."""
+    """(h, w) cells of own within half the width of a body of the middle of moving, seen from above."""
     cells = own.ravel().nonzero()[0]
     x_m, _, z_m = grid.points(cells)
     of_moving = moving.ravel().take(cells)

@@ -109,7 +109,7 @@ def test_a_mover_grown_over_a_wall_keeps_what_there_is_evidence_of_and_as_much_a
 def test_leg_without_evidence_is_not_cut_off_with_the_post_behind() -> None:
     """A person has grown over a post two metres behind; his legs show no motion in this frame."""
     body, post = block((10, 50), (30, 40)), block((5, 60), (40, 44))
-    depth_m = np.where(body, 4.0, np.where(post, 6.0, 0.0)).astype(np.float32)
+    depth_m = np.where(body, 4.0, np.where(post, 6.0, 0.0))
     tracks = one_track(True, 1.0)
     _, after = carve(tracks, block((10, 30), (30, 40)), depth_m, body | post)
     assert (after[body] == 1).all()
