@@ -132,7 +132,7 @@ class Tracker:
         labels = self._claim(detection, above_floor, changes, elapsed_s)
         measured = regions.measure(grid, labels, len(tracks))
         known = len(tracks)
-        carved = carving.carve(tracks, detection, labels, measured, changes.arrived, velocities, self._config)
+        carved = carving.carve(tracks, detection, labels, measured, changes, velocities, self._config)
         tracks.border_is_guess[known:] = tracks.mover[known:]
         if carved is not labels:
             measured = regions.measure(grid, carved, len(tracks))

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from config.perception import DepthNoise, PerceptionConfig
 from hal.compiled import compiled
 from hal.types import FloatArray
-from vision.bodies.arrivals import ARRIVED_UP_TO_S
+from vision.bodies.arrivals import ARRIVED_UP_TO_S, Changes
 from vision.bodies.births import MIN_CELLS
 from vision.bodies.division import SINGLE_WIDTH_M
 from vision.bodies.ends import near_ends
@@ -56,31 +56,31 @@ def carve(
     detection: Detection,
     labels: IntGrid,
     measured: Regions,
-    arrived: BoolGrid,
+    changes: Changes,
     velocities: FragmentVelocities,
     config: PerceptionConfig,
 ) -> IntGrid:
     """labels (h, w), track index + 1, with suspects cut out; these are started in tracks.
 
-    measured: regions of labels. arrived (h, w): cells that have arrived. velocities: of the fragments of
-    detection. The same labels object is returned where there is nothing to cut out.
+    measured: regions of labels. changes: since earlier frames. velocities: of the fragments of detection. The
+    same labels object is returned where there is nothing to cut out.
     """
     if len(tracks) == 0:
         return labels
     suspicious = candidates.moving_candidates(detection.motion, detection.age_frames).nonzero()[0]
-    if len(suspicious) == 0 and not arrived.any():
+    if len(suspicious) == 0 and not changes.arrived.any():
         return labels
     searched, overgrown = _may_hide_mover(tracks, measured, tracks.mover, config.depth_noise)
     asked = searched | overgrown
     if not asked.any():
         return labels
     search_area = _cells_of(labels, asked)
-    moving_cells = arrived & search_area
+    moving_cells = changes.arrived & search_area
     moving_cells |= _around_moving_fragments(detection, velocities, suspicious, search_area, config)
     if not moving_cells.any():
         return labels
     inside = _cells_of(labels, searched) if overgrown.any() else search_area
-    labels = _cut_back(tracks, detection, labels, overgrown, moving_cells, config)
+    labels = _cut_back(tracks, detection, labels, overgrown, moving_cells, changes.stayed, config)
     seeds = moving_cells & inside
     widened = cv2.dilate(seeds.view(np.uint8), _BLOCK)
     grown: BoolGrid = np.asarray(widened, np.uint8).view(np.bool_) & inside
@@ -141,12 +141,14 @@ def _cut_back(
     labels: IntGrid,
     overgrown: NDArray[np.bool_],
     moving_cells: BoolGrid,
+    stayed: BoolGrid,
     config: PerceptionConfig,
 ) -> IntGrid:
     """labels (h, w) with overgrown movers (T,) reduced to the cells that move (moving_cells, (h, w)).
 
     They have grown over furniture they move along. The rest of each begins as a static track. What is as
-    close to the moving cells as parts of one body are does not: a leg would stand as a track of its own.
+    close to the moving cells as parts of one body are, and has not stayed (h, w), goes on with them: a leg
+    would stand as a track of its own.
     """
     for track in overgrown.nonzero()[0].tolist():
         own = labels == track + 1
@@ -154,7 +156,7 @@ def _cut_back(
         kept = widened.view(np.bool_) & own
         if np.count_nonzero(kept) < MIN_CELLS:
             continue
-        rest = own & ~kept & ~_of_one_body(detection.grid, own, kept, config.depth_noise)
+        rest = own & ~kept & ~(_of_one_body(detection.grid, own, kept, config.depth_noise) & ~stayed)
         if np.count_nonzero(rest) < MIN_CELLS:
             continue
         one = regions.measure(detection.grid, rest.astype(np.int32), 1)

@@ -50,7 +50,10 @@ _BINS = 12  # along the line: 0.1 m each where two people walk side by side
 def second_body(
     grid: DepthGrid, labels: IntGrid, track: int, stayed: BoolGrid, displacement_m: float
 ) -> NDArray[np.intp] | None:
-    """Flat cells of labels == track + 1 that belong to a second body, the smaller one; None: it is one body.
+    """Flat cells of labels == track + 1 that belong to a second body; None: it is one body.
+
+    The second body is the smaller one, unless that moves and the larger one stands: then the track goes with
+    the one that moves.
 
     The cells are projected onto the line along which they spread most, seen from above. Two people leave a
     valley in between if they are wider than one; a crate, however wide, does not. Where there is no valley,
@@ -82,18 +85,27 @@ def second_body(
         return None
     if _seen_through(cells[smaller_group], cells[~smaller_group], grid.depth_m.shape[1]):
         return None
-    stays = np.count_nonzero(stayed.ravel().take(cells[smaller_group])) / np.count_nonzero(smaller_group)
-    stands = stays >= 1.0 - _STANDING * min(
-        displacement_m / max(float(np.ptp(along[smaller_group])), 0.1), 1.0
-    )
+    has_stayed = stayed.ravel().take(cells)
+    stands = _stands(has_stayed, along, smaller_group, displacement_m)
     if not stands and _low_beside(cells[smaller_group], cells[~smaller_group], grid.depth_m.shape[1]):
         return None
     # Two heads are two bodies even if nothing farther is seen between them.
     wide = beyond is not None and _reach(along, smaller_group) > SINGLE_WIDTH_M
     if _hidden_between(grid, cells[smaller_group], cells[~smaller_group], wide):
         return None
+    if not stands and _stands(has_stayed, along, ~smaller_group, displacement_m):
+        smaller_group = ~smaller_group
     cut_off: NDArray[np.intp] = cells[smaller_group]
     return cut_off
+
+
+def _stands(
+    has_stayed: NDArray[np.bool_], along: FloatArray, group: NDArray[np.bool_], displacement_m: float
+) -> bool:
+    """Whether more of a group (K,) has stayed (K,) than if it had moved by displacement_m."""
+    stays = np.count_nonzero(has_stayed[group]) / np.count_nonzero(group)
+    left = min(displacement_m / max(float(np.ptp(along[group])), 0.1), 1.0)
+    return bool(stays >= 1.0 - _STANDING * left)
 
 
 def _reach(along: FloatArray, smaller_group: NDArray[np.bool_]) -> float:

@@ -13,6 +13,7 @@ from hal.types import FloatArray
 from tests.support.detections import detection
 from tests.support.grids import CAMERA, COLUMNS, ROWS, grid_of, labelled, nearest, plate, wall
 from vision.bodies import carving
+from vision.bodies.arrivals import Changes
 from vision.bodies.tracks import Tracks
 from vision.depth import regions
 from vision.detection import Detection
@@ -48,6 +49,7 @@ def carve(
     depth_m: FloatArray = BACK,
     of_track: NDArray[np.bool_] = WHOLE,
     seen: Detection | None = None,
+    stayed: NDArray[np.bool_] = NOWHERE,
 ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     """The labels before and after; the one track has of_track."""
     grid = grid_of(depth_m)
@@ -55,7 +57,8 @@ def carve(
     measured = regions.measure(grid, labels, 1)
     looked = detection(grid, FRAME) if seen is None else replace(seen, grid=grid)
     velocities = least_squares.fragment_velocities(looked.motion, CONFIG.motion.max_speed_mps)
-    return labels, carving.carve(tracks, looked, labels, measured, arrived, velocities, CONFIG)
+    changes = Changes(arrived, arrived.ravel().nonzero()[0], stayed, 0.5)
+    return labels, carving.carve(tracks, looked, labels, measured, changes, velocities, CONFIG)
 
 
 def test_arrived_surface_before_a_wall_is_cut_out_as_a_suspect() -> None:
@@ -114,6 +117,15 @@ def test_leg_without_evidence_is_not_cut_off_with_the_post_behind() -> None:
     _, after = carve(tracks, block((10, 30), (30, 40)), depth_m, body | post)
     assert (after[body] == 1).all()
     assert (after[post & ~block((9, 31), (29, 41))] == 2).all()
+
+
+def test_bystander_who_has_stayed_is_cut_off_from_who_walks_by() -> None:
+    walker, bystander = block((10, 50), (30, 40)), block((10, 50), (40, 46))
+    wall_beside = block((5, 60), (50, 79))
+    own = walker | bystander | block((30, 32), (46, 50)) | wall_beside
+    _, after = carve(one_track(True, 1.0), walker, np.where(own, 4.0, 0.0), own, stayed=bystander)
+    assert (after[walker] == 1).all()
+    assert (after[bystander & ~block((9, 51), (29, 41))] == 2).all()
 
 
 def test_a_mover_as_large_as_a_body_is_not_cut_back() -> None:
@@ -177,7 +189,8 @@ def test_without_tracks_there_is_nothing_to_cut() -> None:
     measured = regions.measure(grid, labels, 0)
     looked = detection(grid, FRAME)
     velocities = least_squares.fragment_velocities(looked.motion, CONFIG.motion.max_speed_mps)
-    assert carving.carve(Tracks(), looked, labels, measured, PERSON, velocities, CONFIG) is labels
+    changes = Changes(PERSON, PERSON.ravel().nonzero()[0], NOWHERE, 0.5)
+    assert carving.carve(Tracks(), looked, labels, measured, changes, velocities, CONFIG) is labels
 
 
 def fragments(columns: list[int], speed_mps: float, chi2: float) -> Detection:

@@ -70,6 +70,21 @@ def test_only_the_cells_of_that_track_are_divided() -> None:
     assert second_of(grid, both, 1) is not None
 
 
+@pytest.mark.parametrize(
+    ("barrel_stays", "walker_stays", "barrel_begins_anew"),
+    [(True, False, True), (False, False, False), (True, True, False), (False, True, False)],
+)
+def test_the_track_goes_with_the_one_that_moves_also_if_the_other_is_larger(
+    barrel_stays: bool, walker_stays: bool, barrel_begins_anew: bool
+) -> None:
+    barrel, walker = plate(3.0, (-0.8, -0.25), (-0.7, 0.9)), plate(3.0, (0.25, 0.65), (-0.7, 0.9))
+    depth_m = nearest(barrel, walker, plate(3.0, (-0.25, 0.25), (0.2, 0.32)))
+    stayed = (barrel_stays & (barrel > 0.0)) | (walker_stays & (walker > 0.0))
+    second = second_of(grid_of(depth_m), labelled(depth_m > 0.0), 0, stayed)
+    assert second is not None
+    assert ((barrel > 0.0).ravel()[second].mean() > 0.5) == barrel_begins_anew
+
+
 @pytest.mark.parametrize("width_m", [0.6, 1.4, 2.0])
 def test_a_crate_is_one_however_wide(width_m: float) -> None:
     depth_m = plate(3.0, (-width_m / 2, width_m / 2), (-0.4, 0.6))
