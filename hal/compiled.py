@@ -151,8 +151,11 @@ def _build(
 @contextmanager
 def _interrupts_deferred() -> Iterator[None]:
     """Hold back Ctrl-C until the block ends: the compiler calls Python from C, where an exception is lost."""
-    if threading.current_thread() is not threading.main_thread():
-        yield  # only the main thread is interrupted, and only there may handlers be set
+    in_main_thread = threading.current_thread() is threading.main_thread()
+    if not in_main_thread or signal.getsignal(signal.SIGINT) is None:
+        # Only the main thread is interrupted, and only there may handlers be set. None is a handler that is
+        # not Python's, as in a program that embeds Python: it raises nothing here, and cannot be put back.
+        yield
         return
     held_back: list[int] = []
     before = signal.signal(signal.SIGINT, lambda number, _frame: held_back.append(number))

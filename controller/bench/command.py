@@ -37,7 +37,7 @@ from controller.build import (
 )
 from controller.build_chassis import build_base
 from controller.errors import UserError
-from controller.terminal.outlet import say
+from controller.terminal.outlet import say, say_result
 from hal.clocks import SimulatedClock
 from sim.rendering.camera import SimulatedCamera
 from sim.rendering.render import Renderer
@@ -81,8 +81,9 @@ def run_bench(frames: int, json_path: FilePath | None) -> None:
         _check_writable(json_path)
     with one_opencv_thread():
         report = measure_all(Plan(frames=frames))
+    say_line = say_result if json_path is None else say
     for line in report.lines():
-        say(line)
+        say_line(line)
     if json_path is not None:
         try:
             json_path.write_text(report.to_text(), encoding="utf-8")

@@ -28,7 +28,7 @@ from controller.mission.result import MissionOptions
 from controller.realtime.mission import drive_realtime
 from controller.realtime.service import handlers_kept
 from controller.terminal.console import Console
-from controller.terminal.outlet import say
+from controller.terminal.outlet import say_result
 from hal.api import Clock
 from hal.clocks import NS_PER_MS, NS_PER_S, MonotonicClock
 
@@ -75,7 +75,7 @@ class PeriodFigures:
 
 def run_period_bench(seconds: float) -> None:
     """Measure with ordinary scheduling, then with SCHED_FIFO; print a table. Raises UserError, HalError."""
-    say(
+    say_result(
         f"command period, 20 ms wanted, {seconds:g} s each; perception without a pause in another process\n"
         f"{'scheduling':26}{'commands':>9}{'median':>11}{'p99 off':>11}{'worst off':>11}{'within 1 ms':>13}"
         f"{'load':>6}{'stolen':>9}"
@@ -85,7 +85,7 @@ def run_period_bench(seconds: float) -> None:
         _print_row(name, partial(measure_period, priority, seconds))
     # This process keeps the real-time scheduling of the second drive.
     _print_row("SCHED_FIFO, empty loop", partial(measure_empty_loop, clock, seconds))
-    say(
+    say_result(
         "off: distance of one period from 20 ms. empty loop: nothing but waiting for the next 20 ms, so it\n"
         "shows what is the machine's. load: average of the minute. stolen: processor time that the host of\n"
         "a virtual machine gave to others meanwhile, of all cores."
@@ -95,7 +95,7 @@ def run_period_bench(seconds: float) -> None:
 def _print_row(name: str, measure: Callable[[], PeriodFigures]) -> None:
     before_s = stolen_s(_STAT)
     figures = measure()
-    say(
+    say_result(
         f"{name:26}{figures.commands:9d}{figures.median_ms:8.3f} ms{figures.p99_off_ms:8.3f} ms"
         f"{figures.worst_off_ms:8.3f} ms{figures.within_1_ms:13.2%}{os.getloadavg()[0]:6.1f}"
         f"{stolen_s(_STAT) - before_s:7.2f} s"

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from controller.campaign.judge import Row
 from controller.errors import UserError
+from controller.terminal.outlet import say
 
 MISSIONS = "missions.jsonl"
 SETTINGS = "config.json"
@@ -42,7 +43,13 @@ class MissionStore:
                 raise UserError(
                     f"{self.path} exists: add --resume to go on with it, or give another --report folder"
                 )
-            if resume and self.path.exists():
+            if resume and not self.path.exists():
+                say(
+                    f"treadwatch: warning: {self.path}: no such file, so --resume has nothing to go on "
+                    "with; a new campaign begins",
+                    to_stderr=True,
+                )
+            elif resume:
                 self._check_settings()
                 self._read()
                 self.rewrite()

@@ -15,6 +15,7 @@ from controller.cli.options import (
     BASES,
     FOLDER_OR_FILE,
     ODOMETRY,
+    Group,
     WholeNumber,
     config_option,
     mission_options,
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from controller.mission.result import MissionOptions
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.group(cls=Group, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(package_name="treadwatch", prog_name="treadwatch")
 def cli() -> None:
     """Camera-based speed control for tracked robots on a fixed path."""
@@ -106,10 +107,10 @@ def envelope(config_path: Path) -> None:
     """
     from config.app import load_app
     from controller.cli.envelope import describe_envelope
-    from controller.terminal.outlet import say
+    from controller.terminal.outlet import say_result
 
     for line in describe_envelope(load_app(config_path)):
-        say(line)
+        say_result(line)
 
 
 @cli.command()

@@ -16,6 +16,7 @@ from controller.cli.options import (
     FOLDER,
     FOLDER_OR_FILE,
     ODOMETRY,
+    Command,
     WholeNumber,
     config_option,
     first_seed,
@@ -25,7 +26,7 @@ from controller.cli.options import (
 from controller.errors import UserError
 
 
-@click.command()
+@click.command(cls=Command)
 @click.option("--json", "json_path", type=FILE, help="Also write every figure as JSON.")
 @click.option(
     "--frames", type=WholeNumber(min=10), default=150, show_default=True,
@@ -55,7 +56,7 @@ def bench(json_path: Path | None, frames: int, period: bool, seconds: float) -> 
     run_bench(frames, json_path)
 
 
-@click.command()
+@click.command(cls=Command)
 @click.argument("recordings", type=FOLDER_OR_FILE, nargs=-1)
 @click.option("--sim", "simulated", is_flag=True, help="The simulated set, with truth.")
 @click.option(
@@ -98,7 +99,7 @@ def evaluate(
     )
 
 
-@click.command()
+@click.command(cls=Command)
 @config_option("of robot, camera, chassis, perception and decision")
 @click.option(
     "--missions", type=WholeNumber(1, 1_000_000), default=260, show_default=True,
@@ -168,7 +169,7 @@ def _names(option: str, text: str | None) -> tuple[str, ...]:
     return names
 
 
-@click.command("stop-and-go")
+@click.command("stop-and-go", cls=Command)
 @config_option("of robot, camera, chassis, perception and decision")
 @click.option("--drives", type=WholeNumber(1, 10_000), default=8, show_default=True, help="How often.")
 @first_seed(0)
@@ -197,7 +198,7 @@ def stop_and_go(
     sys.exit(run_stop_and_go(StopAndGoOptions(config_path, drives, seed, mode, report, keep, quiet)))
 
 
-@click.command()
+@click.command(cls=Command)
 @click.option(
     "--processes", "kind", type=BASES,
     help="Also kill and freeze the processes of this chassis' mission, in real time (two minutes).",

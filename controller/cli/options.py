@@ -12,6 +12,7 @@ import click
 from config.camera import OdometryChoice
 from config.chassis import CHASSIS_KINDS
 from config.loader import CONFIG_DIR
+from controller.terminal.outlet import result_on_stdout
 
 if TYPE_CHECKING:
     from controller.mission.result import MissionOptions
@@ -21,6 +22,21 @@ class WholeNumber(click.IntRange):
     """click.IntRange with another name: its message for "x" would be: not a valid integer range."""
 
     name = "whole number"
+
+
+class Command(click.Command):
+    """click.Command whose --help says in one line that it cannot be written; click has a traceback there."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        # The options that print something and end the program do so here.
+        with result_on_stdout():
+            return super().parse_args(ctx, args)
+
+
+class Group(Command, click.Group):
+    """click.Group of such commands, of which --help and --version are written in the same way."""
+
+    command_class = Command
 
 
 FILE = click.Path(path_type=Path, dir_okay=False)

@@ -12,7 +12,7 @@ from config.loader import CONFIG_DIR
 from controller.errors import UserError
 from controller.faults.kills import KILLS, KillResult, run_kill
 from controller.faults.trials import FAULTS, KINDS, TrialResult, run_trial
-from controller.terminal.outlet import say
+from controller.terminal.outlet import say, say_result
 
 HEADING = "## Faults"
 
@@ -46,9 +46,9 @@ def run_faults(options: FaultsOptions) -> None:
         say(f"{options.kind}, processes: {name}", to_stderr=True)
         kills.append(run_kill(options.kind, CONFIG_DIR / f"hil-{options.kind}.yaml", name))
     section = describe(trials, kills, options.kind)
-    say(section)
     if options.into is not None:
         write_section(options.into, section)
+    say_result(section)
 
 
 def describe(trials: list[TrialResult], kills: list[KillResult], kind: str | None) -> str:

@@ -6,10 +6,14 @@ import os
 import queue
 import sys
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from types import TracebackType
 from typing import NamedTuple, Self, TextIO
 
 import click
+
+from controller.errors import UserError
 
 # Lines that are queued while nobody reads: minutes of a drive.
 _MOST = 500
@@ -28,13 +32,9 @@ def write(words: Words) -> None:
     """Write at once, without failing.
 
     A reader that has closed, or a full disk, must not stop a robot: the text is lost, and a warning says so.
-    Characters that the terminal cannot show are escaped.
     """
     try:
-        click.echo(words.text, nl=words.whole, err=words.to_stderr)
-    except UnicodeError:
-        plain = words.text.encode("ascii", "backslashreplace").decode("ascii")
-        click.echo(plain, nl=words.whole, err=words.to_stderr)
+        _echo(words)
     except OSError as error:
         _write_to_nobody(sys.stderr if words.to_stderr else sys.stdout)
         if not words.to_stderr:
@@ -45,6 +45,40 @@ def write(words: Words) -> None:
 def say(line: str, *, to_stderr: bool = False) -> None:
     """Write a whole line at once, for commands that measure: see write."""
     write(Words(line, to_stderr))
+
+
+def say_result(line: str) -> None:
+    """Write a line of what a command is run for and leaves nowhere else: see result_on_stdout."""
+    with result_on_stdout():
+        _echo(Words(line))
+
+
+@contextmanager
+def result_on_stdout() -> Iterator[None]:
+    """A block that writes the whole result of a command to standard output.
+
+    Raises UserError if it cannot be written. A reader that has read enough, such as `head`, ends the program
+    without a message and with exit code 1, as click does.
+    """
+    try:
+        yield
+    except BrokenPipeError as error:
+        _write_to_nobody(sys.stdout)
+        raise SystemExit(1) from error
+    except OSError as error:
+        _write_to_nobody(sys.stdout)
+        raise UserError(
+            f"standard output: cannot be written ({error.strerror}); make room, or send it elsewhere"
+        ) from error
+
+
+def _echo(words: Words) -> None:
+    """Characters that the terminal cannot show are escaped. Raises OSError."""
+    try:
+        click.echo(words.text, nl=words.whole, err=words.to_stderr)
+    except UnicodeError:
+        plain = words.text.encode("ascii", "backslashreplace").decode("ascii")
+        click.echo(plain, nl=words.whole, err=words.to_stderr)
 
 
 class Outlet:

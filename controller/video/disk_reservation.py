@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import errno
 import os
+import resource
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -50,6 +51,10 @@ class DiskReservation:
         file."""
         self._pictures += 1
         needed = os.fstat(self._fd).st_size + _AHEAD_BYTES + self._pictures * _BYTES_A_PICTURE
+        limit, _ = resource.getrlimit(resource.RLIMIT_FSIZE)
+        if limit != resource.RLIM_INFINITY and limit < needed:
+            # Blocks beyond that limit can be reserved, but not written.
+            raise OSError(errno.EFBIG, f"{os.strerror(errno.EFBIG)} for `ulimit -f`, {limit} bytes")
         while self._reserved < needed:
             code = fallocate(self._fd, self._reserved, _STEP_BYTES)
             if code in _NO_ROOM:

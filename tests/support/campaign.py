@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from typing import Any
 
 from config.app import AppConfig, load_app
 from config.faults import NO_FAULTS, Faults, LateWindow, Window
@@ -11,6 +13,7 @@ from config.path import LineSpec, PathSpec
 from config.robot import Robot
 from config.scenario import BodySpec, Crate, Go, MotionPlan, RobotBody, Room, Scenario
 from controller.campaign.drive_log import DriveLog
+from controller.campaign.judge import Row
 from controller.campaign.stage import Stage
 from controller.decision.decision import Action, Decision, Reason
 from controller.record.tally import SetpointTally
@@ -105,3 +108,12 @@ def log_of(speeds_mps: list[float], period_s: float = PERIOD_S, s_m: float = 0.0
         log.sentences.append("")
         s_m += v_mps * period_s
     return log
+
+
+def made_row(seed: int, **changes: Any) -> Row:
+    made = Row(
+        "crossing_left", seed, "ours", "noise", reached=True, expected=True, contacts=0, contacts_at_fault=0,
+        touched=(), time_s=11.0, oracle_time_s=10.0, min_clearance_m=0.5, max_jerk_mps3=0.6,
+        max_accel_mps2=0.3, reversals=0, limit_violations=0, false_stops=0, flaps=0,
+    )  # fmt: skip
+    return replace(made, **changes)

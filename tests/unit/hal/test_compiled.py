@@ -213,6 +213,17 @@ def test_ctrl_c_waits_until_the_step_is_compiled(monkeypatch: pytest.MonkeyPatch
     assert len(finished) == 1
 
 
+def test_handler_of_ctrl_c_that_is_not_python_s_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Such a handler reads as None, and cannot be set again."""
+    monkeypatch.setattr(signal, "getsignal", lambda _number: None)
+    monkeypatch.setattr(signal, "signal", lambda *_: pytest.fail("the handler was replaced"))
+
+    def thrice(value: float) -> float:
+        return 3.0 * value
+
+    assert compiled("float64")(thrice)(2.0) == 6.0
+
+
 def test_without_the_compiler_it_is_plain_python() -> None:
     program = (
         "from hal.compiled import compiled\n"

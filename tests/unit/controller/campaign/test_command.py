@@ -1,11 +1,8 @@
 from __future__ import annotations
 
-import errno
 import importlib.util
 import json
-import math
 import re
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,14 +10,12 @@ import pytest
 from click.testing import CliRunner
 
 from config.loader import CONFIG_DIR
-from controller.campaign.judge import Row
 from controller.campaign.plan import Mission, missions, run_local
-from controller.campaign.store import MISSIONS, SETTINGS, MissionStore
-from controller.campaign.summary import summarise, totals
+from controller.campaign.store import MISSIONS, SETTINGS
 from controller.campaign.task import Task, run_task
 from controller.cli.commands import cli
 from controller.errors import UserError
-from tests.support.campaign import CONFIG
+from tests.support.campaign import CONFIG, made_row
 
 KEYS = {
     "family", "seed", "policy", "reached", "contacts", "contacts_at_fault", "time_s", "oracle_time_s",
@@ -150,52 +145,6 @@ def test_mistakes_are_told_in_one_line(arguments: tuple[str, ...], message: str)
     assert "\n" not in str(caught.value)
 
 
-def test_a_row_that_is_none_is_told_with_its_line(tmp_path: Path) -> None:
-    (tmp_path / MISSIONS).write_text('{"family": 3}\n{}\n')
-    with pytest.raises(UserError, match="line 1 is not a row"):
-        MissionStore(tmp_path, "").begin(resume=True)
-
-
-@pytest.mark.parametrize("last", ["{}\n", "hello\n"])
-def test_a_last_row_that_is_whole_and_none_is_told_and_kept(tmp_path: Path, last: str) -> None:
-    (tmp_path / MISSIONS).write_text(last)
-    with pytest.raises(UserError, match="line 1 is not a row"):
-        MissionStore(tmp_path, "").begin(resume=True)
-    assert (tmp_path / MISSIONS).read_text() == last
-
-
-def test_a_last_row_that_was_cut_off_is_driven_again(tmp_path: Path) -> None:
-    (tmp_path / MISSIONS).write_text('{"family": "plain_w')
-    store = MissionStore(tmp_path, "")
-    store.begin(resume=True)
-    assert store.rows == {}
-
-
-@pytest.mark.parametrize("file", [MISSIONS, SETTINGS])
-def test_a_file_that_is_no_text_is_told_and_kept(tmp_path: Path, file: str) -> None:
-    (tmp_path / MISSIONS).write_text("")
-    (tmp_path / file).write_bytes(b"\xff\xfe\n")
-    with pytest.raises(UserError, match=f"{file}: is no text in UTF-8"):
-        MissionStore(tmp_path, "").begin(resume=True)
-    assert (tmp_path / file).read_bytes() == b"\xff\xfe\n"
-
-
-def test_a_folder_that_cannot_be_made_is_told(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
-    with pytest.raises(UserError, match="choose a folder"):
-        MissionStore(tmp_path / "file" / "report", "").begin(resume=False)
-
-
-def test_a_folder_that_takes_no_files_is_told_before_anything_is_driven() -> None:
-    with pytest.raises(UserError, match="choose a folder"):
-        MissionStore(Path("/proc/self"), "").begin(resume=False)
-
-
-def test_a_folder_is_left_as_it_was_until_the_first_row(tmp_path: Path) -> None:
-    MissionStore(tmp_path, "").begin(resume=False)
-    assert not list(tmp_path.iterdir())
-
-
 def test_missions_of_another_mode_are_not_gone_on_with(tmp_path: Path) -> None:
     """They would count as driven with the camera."""
     (tmp_path / MISSIONS).write_text(json.dumps(made_row(1).as_dict()) + "\n")
@@ -213,65 +162,6 @@ def test_missions_of_another_configuration_are_not_gone_on_with(small: Path, tmp
         campaign("--report", tmp_path, "--resume", "--config", tmp_path / "other.yaml", *SMALL)
     assert "\n" not in str(caught.value)
     assert (tmp_path / MISSIONS).read_text() == (small / MISSIONS).read_text()
-
-
-def test_a_disk_that_fills_is_told_with_how_to_go_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    store = MissionStore(tmp_path, "")
-    store.begin(resume=False)
-    store.add([made_row(1)])
-    kept = store.path.read_text()
-
-    def full(*_: object, **__: object) -> None:
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    monkeypatch.setattr(Path, "open", full)
-    with pytest.raises(UserError, match=r"No space left.*--resume goes on"):
-        store.add([made_row(2)])
-    monkeypatch.undo()
-    assert store.path.read_text() == kept
-
-
-def made_row(seed: int, **changes: Any) -> Row:
-    made = Row(
-        "crossing_left", seed, "ours", "noise", reached=True, expected=True, contacts=0, contacts_at_fault=0,
-        touched=(), time_s=11.0, oracle_time_s=10.0, min_clearance_m=0.5, max_jerk_mps3=0.6,
-        max_accel_mps2=0.3, reversals=0, limit_violations=0, false_stops=0, flaps=0,
-    )  # fmt: skip
-    return replace(made, **changes)
-
-
-def test_totals_add_up_and_ratios_count_where_both_arrived() -> None:
-    one = totals(
-        [
-            made_row(1),
-            made_row(2, time_s=8.0, contacts=2, contacts_at_fault=1, min_clearance_m=-0.1),
-            made_row(3, time_s=15.0, false_stops=2, flaps=1, max_jerk_mps3=2.0),
-            made_row(4, reached=False, time_s=None),
-            made_row(5, reached=False, expected=False, time_s=None, oracle_time_s=None),
-        ]
-    )
-    assert (one.missions, one.reached, one.expected) == (5, 3, 4)
-    assert (one.contacts, one.contacts_at_fault, one.min_clearance_m) == (2, 1, -0.1)
-    assert one.ratio_median == pytest.approx(1.5)
-    assert one.ratio_p90 == math.inf
-    assert (one.false_stops, one.missions_with_false_stop, one.flaps, one.max_jerk_mps3) == (2, 1, 1, 2.0)
-
-
-def test_failed_missions_are_listed_with_their_reason() -> None:
-    summary = summarise(
-        [
-            made_row(1),
-            made_row(2, contacts=1, contacts_at_fault=1, touched=("pallet",)),
-            made_row(3, reached=False, time_s=None),
-            made_row(4, reached=False, expected=False, time_s=None),
-            made_row(5, limit_violations=3, reversals=1),
-        ]
-    )
-    assert summary.failing == [
-        ("crossing_left", 2, "ours", "touched pallet while driving"),
-        ("crossing_left", 3, "ours", "did not reach its target"),
-        ("crossing_left", 5, "ours", "3 setpoints outside the limits; 1 reversals"),
-    ]
 
 
 @pytest.mark.skipif(

@@ -1,5 +1,6 @@
 """A file that cannot be read or written is one line on standard error: which, and why; exit code 2."""
 
+import os
 import shutil
 import subprocess
 import sys
@@ -155,14 +156,42 @@ def test_a_path_that_may_not_even_be_looked_at(tmp_path: Path, arguments: tuple[
     assert "x" * 300 in message
 
 
-@pytest.mark.parametrize("arguments", [("envelope",), ("replay", DESK)], ids=["envelope", "replay"])
-def test_a_disk_that_is_full_behind_standard_output_is_one_line(arguments: tuple[str | Path, ...]) -> None:
+def onto_a_full_disk(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    """What the command answers where its standard output cannot be written."""
     command = [sys.executable, "-m", "controller", *map(str, arguments)]
     with Path("/dev/full").open("w") as full:
-        done = subprocess.run(
+        return subprocess.run(
             command, stdout=full, stderr=subprocess.PIPE, text=True, timeout=120, check=False
         )
+
+
+def test_a_disk_that_is_full_behind_standard_output_ends_no_replay() -> None:
+    done = onto_a_full_disk("replay", DESK)
     assert done.returncode == 0
     assert done.stderr.splitlines() == [
         "treadwatch: warning: nothing more can be written to standard output (No space left on device)"
     ]
+
+
+@pytest.mark.parametrize(
+    "arguments", [("envelope",), ("--help",), ("--version",), ("run", "--help"), ("campaign", "-h")]
+)
+def test_a_result_that_cannot_be_written_is_refused(arguments: tuple[str, ...]) -> None:
+    done = onto_a_full_disk(*arguments)
+    assert done.returncode == 2
+    assert done.stderr.splitlines() == [
+        "treadwatch: standard output: cannot be written (No space left on device); "
+        "make room, or send it elsewhere"
+    ]
+
+
+@pytest.mark.parametrize("arguments", [("envelope",), ("--help",)])
+def test_a_reader_that_has_read_enough_hears_no_complaint(arguments: tuple[str, ...]) -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    command = [sys.executable, "-m", "controller", *arguments]
+    with os.fdopen(writer, "w") as unread:
+        done = subprocess.run(
+            command, stdout=unread, stderr=subprocess.PIPE, text=True, timeout=120, check=False
+        )
+    assert (done.returncode, done.stderr) == (1, "")

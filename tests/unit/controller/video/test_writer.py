@@ -212,6 +212,21 @@ def test_a_full_disk_is_told_before_a_picture_is_lost(
     assert capfd.readouterr().err == ""
 
 
+def test_a_file_that_may_not_become_longer_is_told_before_a_picture_is_lost(tmp_path: Path) -> None:
+    """Blocks beyond the limit of `ulimit -f` can be reserved, and then nothing is written to them."""
+    path = tmp_path / "drive.webm"
+    before, most = resource.getrlimit(resource.RLIMIT_FSIZE)
+    with VideoWriter(path, 30.0) as writer:
+        writer.write(picture(10))
+        resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, most))
+        try:
+            with pytest.raises(VideoError, match=r"File too large for `ulimit -f`, 100000 bytes"):
+                writer.write(picture(20))
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (before, most))
+    assert len(read_back(path)) == 1
+
+
 def test_a_file_system_that_reserves_nothing_is_asked_for_its_free_space(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
