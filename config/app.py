@@ -154,10 +154,7 @@ class AppConfig(Section):
         check_top_speed(self.robot, self.chassis)
         self._check_way()
         check_turns(self.robot, self.chassis)
-        if self.runner.kind == "lockstep" and self.camera.kind != "simulated":
-            raise ValueError(
-                "runner.kind 'lockstep' runs on simulated time and needs camera.kind 'simulated'"
-            )
+        self._check_simulated_time()
         check_protocol(self.robot, self.chassis, self.runner.control_rate_hz)
         return self
 
@@ -176,6 +173,20 @@ class AppConfig(Section):
             raise ValueError("a 'governor' hears commands as they come and needs runner.kind 'realtime'")
         if simulated and self.path is not None:
             raise ValueError("a simulation drives the path of its scenario: write it there, not here")
+
+    def _check_simulated_time(self) -> None:
+        """Nothing outside of the program keeps to the time of the lock-step loop. Raises ValueError."""
+        if self.runner.kind != "lockstep":
+            return
+        if self.camera.kind != "simulated":
+            raise ValueError(
+                "runner.kind 'lockstep' runs on simulated time and needs camera.kind 'simulated'"
+            )
+        if self.simulation is not None and self.simulation.base == "external":
+            raise ValueError(
+                "runner.kind 'lockstep' runs on simulated time and needs simulation.base 'emulated'; with an "
+                "external base use runner.kind 'realtime'"
+            )
 
     def _check_real_robot(self) -> None:
         """Size, mounting and speed of a real robot have no defaults. Raises ValueError."""

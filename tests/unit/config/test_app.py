@@ -252,3 +252,10 @@ def test_frames_farther_apart_than_can_be_compared_are_refused(tmp_path: Path) -
     ):
         load_app(written(tmp_path, frames({"fps": 1.0}, 4.0)))
     load_app(written(tmp_path, frames({"fps": 1.0}, 4.0) | {"perception": {"max_gap_s": 1.0}}))
+
+
+def test_the_lock_step_loop_has_its_base_in_the_program(tmp_path: Path) -> None:
+    config = yaml.safe_load((CONFIG_DIR / "hil-roboteq.yaml").read_text())
+    load_app(written(tmp_path, config))
+    with pytest.raises(ConfigError, match=r"lockstep.* needs simulation\.base 'emulated'"):
+        load_app(written(tmp_path, config | {"runner": {"kind": "lockstep"}}))
