@@ -148,8 +148,8 @@ def _print_figures(summary: Summary) -> None:
             say(f"{split:<13} {name}: {found}")
             for target in TARGETS:
                 value = target.value(figures)
-                mark = "" if target.reached(value, without_odometry) else "  missed"
-                bound = target.bound(without_odometry)
+                bound, verdict = target.bound(without_odometry), target.verdict(value, without_odometry)
+                mark = "" if verdict == "reached" else f"  {verdict}"
                 say(f"{'':13} {target.name:<32} {fixed(value):>7} {target.unit:<8} {bound}{mark}")
 
 

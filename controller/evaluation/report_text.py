@@ -77,11 +77,8 @@ def _verdict(
     target: Target, method_summary: MethodSummary | None, without_odometry: bool
 ) -> tuple[str, str, str]:
     value = math.nan if method_summary is None else target.value(method_summary.figures)
-    return (
-        fixed(value),
-        target.bound(without_odometry),
-        "reached" if target.reached(value, without_odometry) else "**missed**",
-    )
+    verdict = target.verdict(value, without_odometry)
+    return fixed(value), target.bound(without_odometry), "**missed**" if verdict == "missed" else verdict
 
 
 def _table_two(reporting: dict[str, MethodSummary]) -> list[str]:

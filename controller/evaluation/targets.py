@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
 import operator
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal
 
 from controller.evaluation.totals import Figures
+
+Verdict = Literal["reached", "missed", "not measured"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,10 +34,13 @@ class Target:
         limit = self.without_odometry if without_odometry else self.with_odometry
         return f"{'>=' if self.is_minimum else '<='} {limit:g}"
 
-    def reached(self, value: float, without_odometry: bool) -> bool:
-        """Whether the value meets the bound; an unknown value (NaN) does not."""
+    def verdict(self, value: float, without_odometry: bool) -> Verdict:
+        """Whether the value meets the bound. NaN is not measured: no sequence had what it is a figure of."""
+        if math.isnan(value):
+            return "not measured"
         compare = operator.ge if self.is_minimum else operator.le
-        return bool(compare(value, self.without_odometry if without_odometry else self.with_odometry))
+        met = compare(value, self.without_odometry if without_odometry else self.with_odometry)
+        return "reached" if met else "missed"
 
 
 TARGETS = (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import signal
 from dataclasses import replace
 from pathlib import Path
@@ -185,12 +186,12 @@ def test_baselines_look_at_some_sequences_that_exist() -> None:
     assert counts == {"none": 0, "some": len(BASELINE_SEQUENCES), "all": len(SET)}
 
 
-def test_an_unknown_figure_reaches_no_target() -> None:
-    assert not any(
-        target.reached(float("nan"), without_odometry)
-        for target in TARGETS
-        for without_odometry in (True, False)
-    )
+@pytest.mark.parametrize("without_odometry", [True, False])
+def test_a_target_is_reached_missed_or_not_measured(without_odometry: bool) -> None:
+    for target in TARGETS:
+        verdicts = [target.verdict(value, without_odometry) for value in (0.0, 2.0, math.inf, math.nan)]
+        met, not_met = ("missed", "reached") if target.is_minimum else ("reached", "missed")
+        assert verdicts == [met, not_met, not_met, "not measured"], target.name
 
 
 def test_tables_have_three_decimals_and_say_what_is_unknown() -> None:
