@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import shlex
 import sys
 import time
@@ -20,12 +19,11 @@ from controller.campaign.judge import Row
 from controller.campaign.own_scenarios import OwnScenario, keep_own, kept_scenarios, label_of, load_own
 from controller.campaign.plan import Mission, missions, run_local, run_on_cluster
 from controller.campaign.policies import OURS, POLICY_NAMES
-from controller.campaign.report import write_report
+from controller.campaign.report import number_or_never, write_report
 from controller.campaign.store import MissionStore
 from controller.campaign.summary import Summary, why_failed
 from controller.campaign.task import Mode, Task, failed, run_task, time_ratio
 from controller.errors import Interrupted, UserError
-from controller.evaluation import markdown
 from controller.terminal.outlet import say
 from sim.families import FAMILY_NAMES
 
@@ -205,13 +203,12 @@ def command_line(options: CampaignOptions) -> str:
 
 def _print_summary(summary: Summary, count: int, took_s: float, folder: Path) -> None:
     for name, totals in summary.policies.items():
-        median = markdown.fixed(math.nan if totals.ratio_median is None else totals.ratio_median, 2)
-        p90 = markdown.fixed(math.nan if totals.ratio_p90 is None else totals.ratio_p90, 2)
+        median, p90 = number_or_never(totals.ratio_median), number_or_never(totals.ratio_p90)
         say(
             f"{name:<8} {totals.missions} missions, reached {totals.reached}/{totals.expected}, "
-            f"contacts {totals.contacts} ({totals.contacts_at_fault} at fault), time x{median} (p90 x{p90}), "
-            f"false stops {totals.false_stops}, flaps {totals.flaps}, "
-            f"outside limits {totals.limit_violations}"
+            f"contacts {totals.contacts} ({totals.contacts_at_fault} at fault), "
+            f"time over the oracle's {median} (p90 {p90}), "
+            f"false stops {totals.false_stops}, flaps {totals.flaps}, outside limits {totals.limit_violations}"
         )
     if count:
         say(f"speed    {count} missions in {took_s:.1f} s: {count / took_s:.1f} a second")

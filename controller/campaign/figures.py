@@ -85,6 +85,6 @@ def family_figure(summary: Summary) -> Image:
         heights = [math.nan if value is None else value for value in medians]
         left = np.arange(len(families), dtype=np.float64) + (0.1 + bar * number)
         chart.bars(left, left + 0.9 * bar, heights, _COLOURS.get(policy, GREY), policy)
-    chart.target_line(1.1, GREY, "1.10")
+    chart.target_line(1.1, GREY, "target 1.10")
     chart.inline_legend()
     return image

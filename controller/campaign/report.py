@@ -96,7 +96,7 @@ def report_lines(summary: Summary, command: str, driven: list[list[str]]) -> lis
         """Time is that of the drive over that of the oracle, which knows all motions in advance; a drive that
         did not arrive, or was at fault in a contact, counts as one that never does. A contact is at fault
         when the robot moved faster than 0.02 m/s and a driver with the same field of view and reaction
-        avoids it.""",
+        avoids it. A time below 1 goes with a contact that was not at fault, for which the oracle waits.""",
     )
     lines += markdown.table(_HEADER, [[name, *_cells(one)] for name, one in summary.policies.items()])
     lines += markdown.picture("Time over the oracle's", "ratio.png")
@@ -136,9 +136,9 @@ def _cells(totals: Totals) -> list[str]:
         f"{totals.reached}/{totals.expected}",
         str(totals.contacts),
         str(totals.contacts_at_fault),
-        _format(totals.ratio_median),
-        _format(totals.ratio_p90),
-        _format(totals.min_clearance_m),
+        number_or_never(totals.ratio_median),
+        number_or_never(totals.ratio_p90),
+        number_or_never(totals.min_clearance_m),
         str(totals.false_stops),
         str(totals.flaps),
         str(totals.reversals),
@@ -146,7 +146,8 @@ def _cells(totals: Totals) -> list[str]:
     ]
 
 
-def _format(value: float | None) -> str:
+def number_or_never(value: float | None) -> str:
+    """Two decimals; "-" for None, "never" for infinity."""
     if value is None:
         return "-"
     return f"{value:.2f}" if math.isfinite(value) else "never"
