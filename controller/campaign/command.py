@@ -207,8 +207,8 @@ def _print_summary(summary: Summary, count: int, took_s: float, folder: Path) ->
         say(
             f"{name:<8} {totals.missions} missions, reached {totals.reached}/{totals.expected}, "
             f"contacts {totals.contacts} ({totals.contacts_at_fault} at fault), "
-            f"time over the oracle's {median} (p90 {p90}), "
-            f"false stops {totals.false_stops}, flaps {totals.flaps}, outside limits {totals.limit_violations}"
+            f"time over the oracle's {median} (p90 {p90}), false stops {totals.false_stops}, "
+            f"flaps {totals.flaps}, outside limits {totals.limit_violations}"
         )
     if count:
         say(f"speed    {count} missions in {took_s:.1f} s: {count / took_s:.1f} a second")
