@@ -1,6 +1,6 @@
 """Track speeds and pose from the two encoder counters of a motor controller.
 
-The base class of the feedback of RoboClaw and Roboteq.
+The base class of the feedback of RoboClaw and Roboteq, and of other bases with two encoders.
 """
 
 from __future__ import annotations
@@ -38,6 +38,7 @@ class EncoderFeedback:
     signs: +1 or -1 for (left, right), the sign of counts that mean ahead. max_track_mps: maximum track speed.
     checksum: whether the answers have one. If so, a jump is a restart. If not, it may be a wrong digit: the
     answer is dropped as a lost one is, and it was a restart if the next counts go on from it.
+    counter_bits: how wide the counters are.
     """
 
     def __init__(
@@ -48,6 +49,7 @@ class EncoderFeedback:
         max_track_mps: float,
         *,
         checksum: bool = True,
+        counter_bits: int = 32,
     ) -> None:
         self._geometry = geometry
         self._counts_per_m = counts_per_m
@@ -55,7 +57,8 @@ class EncoderFeedback:
         self._max_track_mps = max_track_mps
         self._reckoning = DeadReckoning()
         self._checksum = checksum
-        self._counter = TrackCounter()
+        self._counter_bits = counter_bits
+        self._counter = TrackCounter(counter_bits)
         self._believed: _Counts | None = None
         self._suspect: _Counts | None = None
         self._restarted = False
@@ -126,8 +129,9 @@ class EncoderFeedback:
     def _goes_on(self, last: _Counts, new: _Counts) -> bool:
         """Whether the tracks can have moved from the one to the other."""
         limit = self._jump_limit((new.requested_ns - last.requested_ns) / NS_PER_S)
-        steps = wrapped_difference(new.left, last.left), wrapped_difference(new.right, last.right)
-        return max(map(abs, steps)) <= limit
+        left = wrapped_difference(new.left, last.left, self._counter_bits)
+        right = wrapped_difference(new.right, last.right, self._counter_bits)
+        return max(abs(left), abs(right)) <= limit
 
     def _expected_counts(self, elapsed_s: float) -> tuple[float, float]:
         """Counts (left, right) in this time at the last measured speed; NaN while unknown."""

@@ -15,8 +15,10 @@ STEP_NS = 100_000_000
 class Answers(EncoderFeedback):
     """Counters that answer every 0.1 s; the right one counts down when its track goes ahead."""
 
-    def __init__(self, *, checksum: bool = True) -> None:
-        super().__init__(TrackGeometry(0.5, 1.0), 1000.0, (1, -1), max_track_mps=0.8, checksum=checksum)
+    def __init__(self, *, checksum: bool = True, counter_bits: int = 32) -> None:
+        super().__init__(
+            TrackGeometry(0.5, 1.0), 1000.0, (1, -1), 0.8, checksum=checksum, counter_bits=counter_bits
+        )
         self.now_ns = 0
 
     def answer(self, left: int, right: int, after_ns: int = STEP_NS) -> None:
@@ -53,6 +55,16 @@ def test_a_step_beyond_what_the_tracks_can_do_is_a_restart(step: int, believed: 
     told.answer(step, 0)
     assert math.isfinite(told.v_mps) == believed
     assert (told.pose.x_m > 0.0) == believed
+
+
+@pytest.mark.parametrize("checksum", [True, False])
+def test_counters_of_16_bits_go_on_where_they_wrap(checksum: bool) -> None:
+    told = Answers(checksum=checksum, counter_bits=16)
+    for left, right in ((65_500, 20), (4, 65_516), (44, 65_476)):
+        told.answer(left, right)
+    assert told.v_mps == pytest.approx(0.4)
+    assert told.pose.x_m == pytest.approx(0.08)
+    assert not told._restarted
 
 
 def test_turning_on_the_spot_is_not_standing() -> None:
