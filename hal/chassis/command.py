@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, replace
 
 from config.chassis import COMMAND_EARLY
-from hal.chassis.tracks import scale_to_fit
+from hal.chassis.tracks import TrackGeometry, scale_to_fit
 from hal.clocks import NS_PER_MS
 from hal.types import Setpoint
 
@@ -56,3 +56,17 @@ class CommandLimits:
         if v_mps == setpoint.v_mps and w_radps == setpoint.w_radps:
             return setpoint
         return replace(setpoint, v_mps=v_mps, w_radps=w_radps)
+
+
+def fit_tracks(
+    setpoint: Setpoint, geometry: TrackGeometry, max_track_mps: float
+) -> tuple[Setpoint, float, float]:
+    """The setpoint slowed on the same curve until no track is faster than max_track_mps, with the speeds of
+    the tracks: (setpoint, left_mps, right_mps). CommandLimits.fit does not cover this: a track on the outside
+    of a bend is faster than the middle."""
+    requested = geometry.to_tracks(setpoint.v_mps, setpoint.w_radps)
+    left_mps, right_mps = fitted = scale_to_fit(*requested, max_track_mps, max_track_mps)
+    if fitted == requested:
+        return setpoint, left_mps, right_mps
+    v_mps, w_radps = geometry.to_twist(left_mps, right_mps)
+    return replace(setpoint, v_mps=v_mps, w_radps=w_radps), left_mps, right_mps

@@ -6,17 +6,15 @@ driver sends a command every period, whatever comes back, above all a zero.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from config.chassis import KOBUKI_TOP_SPEED_MPS, KobukiChassisConfig
 from hal.api import SerialLink
 from hal.chassis.arming import ArmingLimits
-from hal.chassis.command import CommandLimits, due, is_zero
+from hal.chassis.command import CommandLimits, due, fit_tracks, is_zero
 from hal.chassis.driver import ChassisDriver
 from hal.chassis.kobuki_feedback import KobukiFeedback
 from hal.chassis.kobuki_packets import WHEEL_BASE_M, FrameReader, base_control, parse
 from hal.chassis.reading import read_all
-from hal.chassis.tracks import TrackGeometry, scale_to_fit
+from hal.chassis.tracks import TrackGeometry
 from hal.clocks import NS_PER_MS
 from hal.types import Setpoint
 
@@ -57,7 +55,7 @@ class KobukiChassis(ChassisDriver):
         stopping = self._moving and is_zero(command)
         if not (stopping or due(self._motion_sent_ns, self._period_ns, now_ns)):
             return None
-        limited = self._limited(command)
+        limited, _, _ = fit_tracks(command, self._geometry, KOBUKI_TOP_SPEED_MPS)
         # The base turns by 1 / slip_factor of what its wheels say, so ask for slip_factor times as much.
         self._link.write(base_control(limited.v_mps, limited.w_radps * self._geometry.slip_factor))
         self._motion_sent_ns = now_ns
@@ -72,12 +70,3 @@ class KobukiChassis(ChassisDriver):
 
     def _begin_arming(self) -> None:
         self._feedback.await_setup()
-
-    def _limited(self, command: Setpoint) -> Setpoint:
-        """The command, scaled down so that no wheel is too fast."""
-        requested = self._geometry.to_tracks(command.v_mps, command.w_radps)
-        limited = scale_to_fit(*requested, KOBUKI_TOP_SPEED_MPS, KOBUKI_TOP_SPEED_MPS)
-        if limited == requested:
-            return command
-        v_mps, w_radps = self._geometry.to_twist(*limited)
-        return replace(command, v_mps=v_mps, w_radps=w_radps)

@@ -11,19 +11,18 @@ being queried.
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import replace
 from itertools import cycle
 
 from config.chassis import RoboclawChassisConfig
 from hal.api import SerialLink
 from hal.chassis import roboclaw_packets as packets
 from hal.chassis.arming import ArmingLimits
-from hal.chassis.command import CommandLimits, is_zero
+from hal.chassis.command import CommandLimits, fit_tracks, is_zero
 from hal.chassis.driver import ChassisDriver
 from hal.chassis.roboclaw_feedback import RoboclawFeedback
 from hal.chassis.roboclaw_packets import Request
 from hal.chassis.roboclaw_port import Answer, RoboclawPort
-from hal.chassis.tracks import TrackGeometry, scale_to_fit
+from hal.chassis.tracks import TrackGeometry
 from hal.clocks import NS_PER_MS
 from hal.types import ChassisMode, Setpoint
 
@@ -57,10 +56,9 @@ class RoboclawChassis(ChassisDriver):
     def __init__(self, link: SerialLink, config: RoboclawChassisConfig) -> None:
         geometry = TrackGeometry(config.track_width_m, config.slip_factor)
         feedback = RoboclawFeedback(config, geometry)
-        max_track_mps = config.max_qpps / config.counts_per_m
         commands = CommandLimits(
-            max_speed_mps=max_track_mps,
-            max_yaw_rate_radps=2.0 * max_track_mps / geometry.effective_width_m,
+            max_speed_mps=config.top_speed_mps,
+            max_yaw_rate_radps=config.top_yaw_rate_radps(0.0),
             timeout_ns=config.command_timeout_ms * NS_PER_MS,
         )
         limits = ArmingLimits(
@@ -73,7 +71,6 @@ class RoboclawChassis(ChassisDriver):
         self._config = config
         self._geometry = geometry
         self._feedback = feedback
-        self._max_track_mps = max_track_mps
         self._port = RoboclawPort(link, config.address)
         self._setup: deque[Request] = deque()
         self._turns_before_setup = 0
@@ -135,14 +132,10 @@ class RoboclawChassis(ChassisDriver):
         self._setup = deque((packets.set_timeout(self._config.timeout_ms), packets.GET_TIMEOUT_REQUEST))
 
     def _send_motion(self, command: Setpoint, now_ns: int) -> Setpoint:
-        config, limit = self._config, self._max_track_mps
-        requested = self._geometry.to_tracks(command.v_mps, command.w_radps)
-        left_mps, right_mps = limited = scale_to_fit(*requested, limit, limit)
+        config = self._config
+        fitted, left_mps, right_mps = fit_tracks(command, self._geometry, config.top_speed_mps)
         left_qpps = config.left_sign * left_mps * config.counts_per_m
         right_qpps = config.right_sign * right_mps * config.counts_per_m
         self._port.start(packets.ramped_speeds(config.accel_qpps2, left_qpps, right_qpps), now_ns)
         self._moving = not is_zero(command)
-        if limited == requested:
-            return command
-        v_mps, w_radps = self._geometry.to_twist(left_mps, right_mps)
-        return replace(command, v_mps=v_mps, w_radps=w_radps)
+        return fitted

@@ -28,7 +28,7 @@ class RoboclawFeedback(EncoderFeedback):
 
     def __init__(self, config: RoboclawChassisConfig, geometry: TrackGeometry) -> None:
         signs = (config.left_sign, config.right_sign)
-        super().__init__(geometry, config.counts_per_m, signs, config.max_qpps / config.counts_per_m)
+        super().__init__(geometry, config.counts_per_m, signs, config.top_speed_mps)
         self._config = config
         self._status: Status | None = None
         self._timeout_ms: int | None = None

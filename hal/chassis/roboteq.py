@@ -7,20 +7,19 @@ speed from before. So the first command after any gap is !M 0 0.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import cycle
 
 from config.chassis import RoboteqChassisConfig
 from hal.api import SerialLink
 from hal.chassis import roboteq_lines as lines
 from hal.chassis.arming import ArmingLimits
-from hal.chassis.command import CommandLimits, due, is_zero
+from hal.chassis.command import CommandLimits, due, fit_tracks, is_zero
 from hal.chassis.driver import ChassisDriver
 from hal.chassis.late_answer import late_answer
 from hal.chassis.reading import read_all
 from hal.chassis.roboteq_feedback import RoboteqFeedback
 from hal.chassis.roboteq_lines import LineReader, Query, Reply
-from hal.chassis.tracks import TrackGeometry, scale_to_fit
+from hal.chassis.tracks import TrackGeometry
 from hal.clocks import NS_PER_MS
 from hal.errors import LinkLost
 from hal.types import ChassisMode, Setpoint
@@ -56,8 +55,8 @@ class RoboteqChassis(ChassisDriver):
         geometry = TrackGeometry(config.track_width_m, config.slip_factor)
         feedback = RoboteqFeedback(config, geometry)
         commands = CommandLimits(
-            max_speed_mps=config.full_speed_mps,
-            max_yaw_rate_radps=2.0 * config.full_speed_mps / geometry.effective_width_m,
+            max_speed_mps=config.top_speed_mps,
+            max_yaw_rate_radps=config.top_yaw_rate_radps(0.0),
             timeout_ns=config.command_timeout_ms * NS_PER_MS,
         )
         limits = ArmingLimits(
@@ -173,13 +172,10 @@ class RoboteqChassis(ChassisDriver):
         return latched and now_ns - self._arming.since_ns > _STOP_TIMEOUT_NS and not self._feedback.standing
 
     def _motion(self, command: Setpoint) -> tuple[bytes, Setpoint]:
-        """The line for this command, and the command scaled down so that no track is too fast."""
-        config, limit = self._config, self._config.full_speed_mps
-        requested = self._geometry.to_tracks(command.v_mps, command.w_radps)
-        left_mps, right_mps = limited = scale_to_fit(*requested, limit, limit)
-        scale = lines.FULL_SCALE / limit
-        line = lines.motors(config.left_sign * left_mps * scale, config.right_sign * right_mps * scale)
-        if limited == requested:
-            return line, command
-        v_mps, w_radps = self._geometry.to_twist(left_mps, right_mps)
-        return line, replace(command, v_mps=v_mps, w_radps=w_radps)
+        """The line for this command, and the command as it fits the tracks."""
+        config = self._config
+        fitted, left_mps, right_mps = fit_tracks(command, self._geometry, config.full_speed_mps)
+        scale = lines.FULL_SCALE / config.full_speed_mps
+        return lines.motors(
+            config.left_sign * left_mps * scale, config.right_sign * right_mps * scale
+        ), fitted

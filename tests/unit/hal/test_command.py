@@ -1,10 +1,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 
-from hal.chassis.command import CommandLimits, due, is_zero, zero
+from hal.chassis.command import CommandLimits, due, fit_tracks, is_zero, zero
+from hal.chassis.tracks import TrackGeometry
 from hal.types import Setpoint
 
 MS = 1_000_000
@@ -68,3 +70,13 @@ def test_a_command_within_limits_is_left_alone() -> None:
 
 def test_no_command_is_an_explicit_zero() -> None:
     assert LIMITS.fit(None, 9) == Setpoint(9, 0.0, 0.0, 0.0)
+
+
+def test_a_bend_is_slowed_until_its_outer_track_can_keep_up() -> None:
+    """Tracks 0.5 m apart, 2 rad/s: the outer one is 0.5 m/s faster than the middle."""
+    geometry = TrackGeometry(0.4, slip_factor=1.25)
+    asked = setpoint(0.75, 2.0)
+    assert fit_tracks(asked, geometry, 1.25) == (asked, 0.25, 1.25)
+    fitted, left_mps, right_mps = fit_tracks(asked, geometry, 0.625)
+    assert (left_mps, right_mps) == (0.125, 0.625)
+    assert fitted == replace(asked, v_mps=0.375, w_radps=1.0)
