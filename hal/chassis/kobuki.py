@@ -33,7 +33,7 @@ class KobukiChassis(ChassisDriver):
             arming_timeout_ns=config.arming_timeout_ms * NS_PER_MS,
             max_step_gap_ns=config.base_timeout_ms * NS_PER_MS,
         )
-        super().__init__(link, feedback, commands, limits)
+        super().__init__(link, feedback, commands, limits, config.battery_low_v)
         self._link = link
         self._feedback = feedback
         self._geometry = TrackGeometry(WHEEL_BASE_M, config.slip_factor)

@@ -141,9 +141,9 @@ class KobukiFeedback:
         core = self._core
         if core is None:
             return ()
-        return self._battery_faults(core.battery_v) + _named_bits(
-            "error: motor over-current", core.over_current, _MOTORS
-        )
+        dangerous = f"error: battery below {_BATTERY_DANGEROUS_V:g} V"
+        battery = (dangerous,) if core.battery_v < _BATTERY_DANGEROUS_V else ()
+        return battery + _named_bits("error: motor over-current", core.over_current, _MOTORS)
 
     def await_setup(self) -> None:
         """Arming begins: what is reported from now on need not continue what waited in buffers before."""
@@ -205,12 +205,6 @@ class KobukiFeedback:
         self._counter = TrackCounter(ENCODER_BITS)
         self._counter.increments(core.left_ticks, core.right_ticks, math.inf)
         self.v_mps = self.w_radps = math.nan
-
-    def _battery_faults(self, battery_v: float) -> tuple[str, ...]:
-        low_v = self._config.battery_low_v
-        if battery_v < _BATTERY_DANGEROUS_V:
-            return (f"error: battery below {_BATTERY_DANGEROUS_V:g} V",)
-        return (f"warning: battery below {low_v:g} V",) if low_v is not None and battery_v < low_v else ()
 
     def _max_wheel_mps(self) -> float:
         config = self._config

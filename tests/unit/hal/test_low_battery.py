@@ -80,7 +80,7 @@ def test_a_kobuki_has_the_limit_of_its_file() -> None:
     bench = KobukiBench(battery_low_v=15.0)
     bench.arm()
     bench.emulator.battery_v = 14.5
-    now = bench.run(2, 0.3)
+    now = bench.run(160, 0.3)
     assert (now.mode, now.faults) == (ChassisMode.ARMED, ("warning: battery below 15 V",))
 
 
