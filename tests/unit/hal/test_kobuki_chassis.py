@@ -106,7 +106,7 @@ WARNING, ERROR = "warning: battery below 14 V", "error: battery below 13.2 V"
 def test_a_low_battery_is_told(
     battery_v: float, at_once: tuple[str, ...], after_3_s: tuple[str, ...]
 ) -> None:
-    """A start pulls the voltage down for a moment, so only what the vendor calls dangerous is told at once."""
+    """A start pulls the voltage down for a moment: only what the vendor calls dangerous is told at once."""
     bench = Bench()
     bench.arm()
     bench.emulator.battery_v = battery_v
