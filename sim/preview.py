@@ -1,4 +1,4 @@
-"""Draws a scenario: ``python -m sim.preview SCENARIO --time T --out file.png``."""
+"""Draws a scenario: ``python -m sim.preview SCENARIO --time T --out file.png`` (docs/scenarios.md)."""
 
 from __future__ import annotations
 
@@ -25,22 +25,37 @@ from sim.world import World
 
 _MAX_DEPTH_M = 10.0
 _MAP_PX = (848, 480)
+_INK = (60, 60, 60)
+
+
+class _Mistake(click.ClickException):
+    """A mistake of the user: one line, and the exit code of the other commands."""
+
+    exit_code = 2
+
+
+def _finite(_context: click.Context, option: click.Parameter, value: float) -> float:
+    if not math.isfinite(value):
+        raise _Mistake(f"--{option.name}: {value} is no finite number")
+    return value
 
 
 @click.command()
 @click.argument("scenario")
 @click.option(
-    "--time", "t_s", type=click.FloatRange(min=0), default=0.0, help="Time of the world in seconds."
+    "--time", type=click.FloatRange(min=0), default=0.0, callback=_finite, help="Time of the world, in s."
 )
-@click.option("--along", "along_m", type=float, default=0.0, help="Where the robot is on its path, in m.")
-@click.option("--seed", type=int, default=1, help="Picks textures and jitter.")
+@click.option("--along", type=float, default=0.0, callback=_finite, help="How far on its path, in m.")
+@click.option("--seed", type=click.IntRange(min=0), default=1, help="Picks textures and jitter.")
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="PNG to write.")
-def main(scenario: str, t_s: float, along_m: float, seed: int, out: Path) -> None:
-    """Draw what the robot's camera sees in SCENARIO: colour, depth, instances and a map."""
+def main(scenario: str, time: float, along: float, seed: int, out: Path) -> None:
+    """Draw what the robot's camera sees in SCENARIO: colour, depth, bodies and a map."""
+    if not cv2.haveImageWriter(str(out)):
+        raise _Mistake(f"{out}: is no kind of image; end its name with .png")
     try:
         spec = load_scenario(scenario)
     except ConfigError as error:
-        raise click.ClickException(str(error)) from error
+        raise _Mistake(str(error)) from error
     world, robot = World(spec, seed), Robot()
     mount = CameraMount(
         robot.camera_mount.forward_m,
@@ -48,16 +63,16 @@ def main(scenario: str, t_s: float, along_m: float, seed: int, out: Path) -> Non
         robot.camera_mount.height_m,
         robot.camera_mount.pitch_rad,
     )
-    pose = pose_along(spec.path, along_m)
-    # The world began t_s ago, so the camera gives the frame of that time.
-    clock = SimulatedClock(round(t_s * NS_PER_S))
+    pose = pose_along(spec.path, along)
+    # The world began that long ago, so the camera gives the frame of that time.
+    clock = SimulatedClock(round(time * NS_PER_S))
     camera = SimulatedCamera(
         world, SimulatedCameraConfig(), mount, clock, body_pose=lambda _: pose, start_ns=0
     )
     frame = camera.read(timeout_s=1.0)
     picture = camera.last_picture
     if picture is None or not cv2.imwrite(str(out), sheet(frame, picture, world, robot, pose)):
-        raise click.ClickException(f"{out}: cannot be written; check the folder and that it ends in .png")
+        raise _Mistake(f"{out}: cannot be written; name a file in a folder that exists")
 
 
 def pose_along(path: PathSpec, along_m: float) -> PlanarPose:
@@ -102,8 +117,7 @@ def mask_colours(mask: NDArray[np.uint16]) -> ColourImage:
 
 
 def _map(world: World, robot: Robot, pose: PlanarPose, t_s: float) -> ColourImage:
-    """The scene from above: path, footprints, the robot, and each body's velocity as its way in one
-    second."""
+    """The scene from above: walls, path, the robot, and each body with its name and its way in one second."""
     room = world.scenario.room
     width, height = _MAP_PX
     scale = min(width / (room.x_max_m - room.x_min_m), height / (room.y_max_m - room.y_min_m))
@@ -114,6 +128,8 @@ def _map(world: World, robot: Robot, pose: PlanarPose, t_s: float) -> ColourImag
         v = 0.5 * height - (points[:, 1] - 0.5 * (room.y_min_m + room.y_max_m)) * scale
         return np.stack([u, v], axis=1).round().astype(np.int32)
 
+    walls = [[room.x_min_m, room.y_min_m], [room.x_max_m, room.y_max_m]]
+    cv2.rectangle(plan, *pixels(np.array(walls)).tolist(), _INK, 3)
     length = world.scenario.path.length_m
     stations = [pose_along(world.scenario.path, s) for s in np.linspace(0.0, length, 200)]
     route = pixels(np.array([[p.x_m, p.y_m] for p in stations]))
@@ -124,6 +140,8 @@ def _map(world: World, robot: Robot, pose: PlanarPose, t_s: float) -> ColourImag
         here = np.array([[state.pose.x_m, state.pose.y_m]])
         ends = pixels(np.concatenate([here, here + state.velocity_mps]))
         cv2.line(plan, tuple(ends[0].tolist()), tuple(ends[1].tolist()), colour, 2, cv2.LINE_AA)
+        beside = (ends[0] + (6, -6)).tolist()
+        cv2.putText(plan, state.name, beside, cv2.FONT_HERSHEY_SIMPLEX, 0.4, _INK, 1, cv2.LINE_AA)
     cv2.fillConvexPoly(plan, pixels(robot_footprint(robot.body, pose)), (200, 120, 40), cv2.LINE_AA)
     return plan
 

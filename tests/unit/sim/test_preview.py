@@ -9,7 +9,10 @@ import pytest
 from click.testing import CliRunner
 
 from config.path import ArcSpec, LineSpec, PathSpec
-from sim.preview import main, pose_along
+from config.robot import Robot
+from config.scenario import load_scenario
+from sim.preview import _map, main, pose_along
+from sim.world import World
 
 BEND = PathSpec(
     segments=(
@@ -32,14 +35,33 @@ def test_preview_holds_four_pictures(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("scenario", "file", "says"),
-    [("moon", "look.png", "no such scenario"), ("empty", "no/such/folder/look.png", "cannot be written")],
+    ("arguments", "says"),
+    [
+        (("moon", "--out", "look.png"), "no such scenario"),
+        (("empty", "--out", "no/such/folder/look.png"), "cannot be written"),
+        (("empty", "--out", "look.txt"), "no kind of image"),
+        (("empty", "--out", "look.png", "--time", "nan"), "--time: nan is no finite number"),
+        (("empty", "--out", "look.png", "--along", "inf"), "--along: inf is no finite number"),
+    ],
 )
-def test_preview_errors_are_reported_in_one_line(scenario: str, file: str, says: str, tmp_path: Path) -> None:
-    done = CliRunner().invoke(main, [scenario, "--out", str(tmp_path / file)])
-    assert done.exit_code != 0
+def test_a_mistake_is_one_line(
+    arguments: tuple[str, ...], says: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(main, arguments)
+    assert done.exit_code == 2
     assert says in done.output
     assert len(done.output.strip().splitlines()) == 1
+
+
+def test_the_map_shows_the_walls() -> None:
+    scenario = load_scenario("empty")
+    world, robot = World(scenario), Robot()
+    plan = _map(world, robot, pose_along(scenario.path, 0.0), 0.0)
+    room = scenario.room
+    scale = min(848 / (room.x_max_m - room.x_min_m), 480 / (room.y_max_m - room.y_min_m))
+    top = round(240 - 0.5 * scale * (room.y_max_m - room.y_min_m))
+    assert (plan[max(top, 0) + 1, 100] < 100).all()
 
 
 @pytest.mark.parametrize(
