@@ -27,7 +27,7 @@ from config.path import LineSpec, PathSpec
 from config.robot import Robot
 from config.scenario import Scenario, load_scenario
 from controller.answer import BaseAnswer
-from controller.control import ControlLoop
+from controller.control import ControlLoop, Decides
 from controller.decision.decide import DecisionMaker
 from controller.follow import PathFollower
 from controller.localise import Localiser
@@ -47,8 +47,9 @@ from hal.cameras.recording import Recording
 from hal.cameras.tum_replay import TumReplay
 from hal.clocks import NS_PER_S
 from hal.errors import BadRecording
+from hal.geometry import mount_of
 from hal.links.datagrams import UdpSocket, UnixSocket
-from hal.types import CameraMount, PlanarPose
+from hal.types import PlanarPose
 from sim.rendering.camera import SimulatedCamera
 from sim.rendering.faulty_camera import FaultyCamera
 from sim.rendering.late_camera import LateCamera
@@ -66,12 +67,6 @@ REPLAY_FPS = 30.0
 def limit_vision_threads() -> None:
     """Let OpenCV use one core: the second one is for the control process."""
     cv2.setNumThreads(1)
-
-
-def mount_of(config: AppConfig) -> CameraMount:
-    """Where the camera is mounted on this robot."""
-    mount = config.robot.camera_mount
-    return CameraMount(mount.forward_m, mount.left_m, mount.height_m, mount.pitch_rad)
 
 
 def scenario_of(simulation: SimulationConfig, config_path: FilePath) -> Scenario:
@@ -112,25 +107,34 @@ def build_perceiver(
     """Perception: detect and track, timed by stopwatch_ns."""
     limit_vision_threads()
     perception = Perception(
-        config.perception, mount_of(config), config.robot.body.height_m, config.robot.body.clearance_m
+        config.perception, mount_of(config.robot), config.robot.body.height_m, config.robot.body.clearance_m
     )
     return Perceiver(perception, odometry, body_pose, stopwatch_ns)
 
 
 def build_control(config: AppConfig, config_path: FilePath, chassis: Chassis) -> ControlLoop:
     """Decide, shape and follow, for a chassis that is opened elsewhere. Raises ConfigError, PathError."""
-    robot, decision = config.robot, config.decision
+    return build_control_loop(config, build_path(config, config_path), build_decision(config), chassis)
+
+
+def build_decision(config: AppConfig) -> DecisionMaker:
+    """The decision for this robot and its camera."""
     period_s = 1.0 / config.runner.control_rate_hz
-    path = build_path(config, config_path)
-    mount = mount_of(config)
+    noise = config.perception.depth_noise
+    return DecisionMaker(config.decision, config.robot, mount_of(config.robot), period_s, noise)
+
+
+def build_control_loop(config: AppConfig, path: Path, decide: Decides, chassis: Chassis) -> ControlLoop:
+    """Shape, follow and localise around a decision; campaigns put other policies in its place."""
+    limits, delay_s = config.robot.limits, config.decision.chassis_delay_s
     return ControlLoop(
         path=path,
-        decide=DecisionMaker(decision, robot, mount, period_s, config.perception.depth_noise),
-        shape=SpeedShaper(robot.limits, period_s, decision.chassis_delay_s),
-        follow=PathFollower(path, robot.limits, decision.chassis_delay_s),
-        localiser=Localiser(path.start, mount),
+        decide=decide,
+        shape=SpeedShaper(limits, 1.0 / config.runner.control_rate_hz, delay_s),
+        follow=PathFollower(path, limits, delay_s),
+        localiser=Localiser(path.start, mount_of(config.robot)),
         chassis=chassis,
-        answer=BaseAnswer(decision.chassis_delay_s, robot.limits.max_speed_mps),
+        answer=BaseAnswer(delay_s, limits.max_speed_mps),
     )
 
 
@@ -177,7 +181,7 @@ def open_simulated_camera(
     return SimulatedCamera(
         build_world(config, config_path),
         config.camera,
-        mount_of(config),
+        mount_of(config.robot),
         clock,
         lambda stamp_ns: body_pose(stamp_ns) or start,
         start_ns,
@@ -227,7 +231,7 @@ def build_still_world(config: AppConfig, config_path: FilePath) -> World:
 def surroundings(config: AppConfig) -> Surroundings:
     """What a video shows around the observations."""
     return Surroundings(
-        mount_of(config),
+        mount_of(config.robot),
         config.robot.body,
         config.robot.body.width_m / 2.0 + config.decision.margins.lateral_m,
         _fps(config),

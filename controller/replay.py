@@ -30,7 +30,7 @@ from controller.terminal.console import Console
 from hal.cameras.bag_topics import WantedTopics
 from hal.clocks import NS_PER_S
 from hal.errors import EndOfStream
-from hal.geometry import camera_in_body
+from hal.geometry import camera_in_body, mount_of
 from hal.types import CameraMount, PlanarPose
 from vision.scene import CameraCondition, EgoMotion
 
@@ -159,8 +159,7 @@ def recorded_mount(config: ReplayConfig, recorded: CameraMount | None) -> Camera
     """The recording's own mounting; else the robot's if that may be assumed; else None."""
     if recorded is not None or not config.assume_mount:
         return recorded
-    mount = config.robot.camera_mount
-    return CameraMount(mount.forward_m, mount.left_m, mount.height_m, mount.pitch_rad)
+    return mount_of(config.robot)
 
 
 _AHEAD_M = np.column_stack([np.linspace(0.0, 10.0, 41), np.zeros(41)])

@@ -7,10 +7,17 @@ from functools import lru_cache
 
 import numpy as np
 
+from config.robot import Robot
 from hal.types import CameraMount, FloatArray, PlanarPose, Pose
 
 # Columns: the optical axes x right, y down, z forward, written in body axes.
 _OPTICAL_IN_BODY: FloatArray = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+
+
+def mount_of(robot: Robot) -> CameraMount:
+    """Where the camera is mounted on a robot, by its configuration."""
+    mount = robot.camera_mount
+    return CameraMount(mount.forward_m, mount.left_m, mount.height_m, mount.pitch_rad)
 
 
 @lru_cache(maxsize=16)

@@ -16,8 +16,8 @@ from config.path import PathSpec
 from config.robot import Robot
 from config.scenario import load_scenario
 from hal.clocks import NS_PER_S, SimulatedClock
-from hal.geometry import advance_pose
-from hal.types import CameraMount, ColourImage, PlanarPose, RgbdFrame
+from hal.geometry import advance_pose, mount_of
+from hal.types import ColourImage, PlanarPose, RgbdFrame
 from sim.contact import robot_footprint
 from sim.rendering.camera import SimulatedCamera
 from sim.rendering.render import Picture
@@ -57,17 +57,11 @@ def main(scenario: str, time: float, along: float, seed: int, out: Path) -> None
     except ConfigError as error:
         raise _Mistake(str(error)) from error
     world, robot = World(spec, seed), Robot()
-    mount = CameraMount(
-        robot.camera_mount.forward_m,
-        robot.camera_mount.left_m,
-        robot.camera_mount.height_m,
-        robot.camera_mount.pitch_rad,
-    )
     pose = pose_along(spec.path, along)
     # The world began that long ago, so the camera gives the frame of that time.
     clock = SimulatedClock(round(time * NS_PER_S))
     camera = SimulatedCamera(
-        world, SimulatedCameraConfig(), mount, clock, body_pose=lambda _: pose, start_ns=0
+        world, SimulatedCameraConfig(), mount_of(robot), clock, body_pose=lambda _: pose, start_ns=0
     )
     frame = camera.read(timeout_s=1.0)
     picture = camera.last_picture
@@ -128,8 +122,8 @@ def _map(world: World, robot: Robot, pose: PlanarPose, t_s: float) -> ColourImag
         v = 0.5 * height - (points[:, 1] - 0.5 * (room.y_min_m + room.y_max_m)) * scale
         return np.stack([u, v], axis=1).round().astype(np.int32)
 
-    walls = [[room.x_min_m, room.y_min_m], [room.x_max_m, room.y_max_m]]
-    cv2.rectangle(plan, *pixels(np.array(walls)).tolist(), _INK, 3)
+    low, high = pixels(np.array([[room.x_min_m, room.y_min_m], [room.x_max_m, room.y_max_m]])).tolist()
+    cv2.rectangle(plan, low, high, _INK, 3)
     length = world.scenario.path.length_m
     stations = [pose_along(world.scenario.path, s) for s in np.linspace(0.0, length, 200)]
     route = pixels(np.array([[p.x_m, p.y_m] for p in stations]))

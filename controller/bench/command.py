@@ -30,7 +30,6 @@ from controller.bench.report import BenchReport
 from controller.build import (
     build_control,
     build_path,
-    mount_of,
     open_replay,
     open_simulated_camera,
     scenario_of,
@@ -39,6 +38,7 @@ from controller.build_chassis import build_base
 from controller.errors import UserError
 from controller.terminal.outlet import say, say_result
 from hal.clocks import SimulatedClock
+from hal.geometry import mount_of
 from sim.rendering.camera import SimulatedCamera
 from sim.rendering.render import Renderer
 from sim.simulation import Emulator
@@ -148,7 +148,7 @@ def _simulated_reel_figures(config: AppConfig, plan: Plan, width: int, height: i
     camera, path = _simulated_camera(config, plan, width, height), build_path(config, plan.mission)
     size = f"{width}x{height}"
     with progress(f"rendering frames, {size}", plan.frames) as tick:
-        reel = render_reel(camera, path, mount_of(config), plan.frames, tick)
+        reel = render_reel(camera, path, mount_of(config.robot), plan.frames, tick)
     return _reel_figures(f"perception, {size}", reel, config.perception, config.robot.body, passes=1)
 
 

@@ -14,12 +14,11 @@ from tempfile import TemporaryDirectory
 
 from config.app import AppConfig, LockstepRunner, SimulationConfig
 from config.scenario import as_yaml
-from controller.answer import BaseAnswer
 from controller.build import (
+    build_control_loop,
     build_path,
     build_perceiver,
     build_simulation,
-    mount_of,
     open_faulty_camera,
     surroundings,
 )
@@ -28,18 +27,12 @@ from controller.campaign.drive_log import DriveLog
 from controller.campaign.noise_mission import GIVE_UP_S
 from controller.campaign.policies import build_policy
 from controller.campaign.stage import Stage
-from controller.control import ControlLoop
 from controller.ending import SETTLE_S, Outcome
 from controller.errors import UserError
-from controller.follow import PathFollower
-from controller.localise import Localiser
 from controller.lockstep import run_lockstep
-from controller.path.path import Path
 from controller.record.recorder import RecordingOptions, RunRecorder, open_recorder
 from controller.record.tally import SetpointTally
 from controller.scenario_faults import with_slip_and_vibration
-from controller.shape import SpeedShaper
-from hal.api import Chassis
 from hal.clocks import NS_PER_S, SimulatedClock
 from hal.types import ChassisMode, PlanarPose
 from sim.simulation import Simulation
@@ -89,7 +82,7 @@ def _drive(
     camera = open_faulty_camera(
         config, scenario, clock, lambda _stamp_ns: simulation.body_pose, clock.now_ns()
     )
-    loop = _control_loop(stage, config, policy, path, chassis)
+    loop = build_control_loop(config, path, build_policy(policy, config, stage), chassis)
     options = _NO_RECORDING if keep is None else prepare_recording(keep, stage)
     log = DriveLog(SetpointTally(config.robot.limits, 1.0 / config.runner.control_rate_hz))
     with ExitStack() as devices:
@@ -116,20 +109,6 @@ def _drive(
     if loop.ending.outcome is Outcome.REACHED:
         log.reached_s = log.times_s[-1] - SETTLE_S - monitor.armed_s
     return log
-
-
-def _control_loop(stage: Stage, config: AppConfig, policy: str, path: Path, chassis: Chassis) -> ControlLoop:
-    """The control loop of controller.build, with this policy in place of the decision."""
-    limits, delay_s = config.robot.limits, config.decision.chassis_delay_s
-    return ControlLoop(
-        path=path,
-        decide=build_policy(policy, config, stage),
-        shape=SpeedShaper(limits, 1.0 / config.runner.control_rate_hz, delay_s),
-        follow=PathFollower(path, limits, delay_s),
-        localiser=Localiser(path.start, mount_of(config)),
-        chassis=chassis,
-        answer=BaseAnswer(delay_s, limits.max_speed_mps),
-    )
 
 
 def prepare_recording(folder: FilePath, stage: Stage) -> RecordingOptions:

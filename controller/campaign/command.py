@@ -13,13 +13,12 @@ from pathlib import Path
 import click
 
 from config.app import AppConfig, LockstepRunner, load_app
-from config.loader import CONFIG_DIR
 from config.scenario import Scenario
 from controller.campaign.judge import Row
 from controller.campaign.own_scenarios import OwnScenario, keep_own, kept_scenarios, label_of, load_own
 from controller.campaign.plan import Mission, missions, run_local, run_on_cluster
 from controller.campaign.policies import OURS, POLICY_NAMES
-from controller.campaign.report import number_or_never, write_report
+from controller.campaign.report import config_option_text, number_or_never, write_report
 from controller.campaign.store import MissionStore
 from controller.campaign.summary import Summary, why_failed
 from controller.campaign.task import Mode, Task, failed, run_task, time_ratio
@@ -189,9 +188,10 @@ def format_row(row: Row) -> str:
 
 def command_line(options: CampaignOptions) -> str:
     """The command that repeats the campaign."""
-    parts = [f"treadwatch campaign --missions {options.missions} --mode {options.mode} --seed {options.seed}"]
-    if options.config_path != CONFIG_DIR / "sim.yaml":
-        parts.append(f"--config {shlex.quote(str(options.config_path))}")
+    parts = [
+        f"treadwatch campaign --missions {options.missions} --mode {options.mode} --seed {options.seed}"
+        f"{config_option_text(options.config_path)}"
+    ]
     parts.extend(f"--scenario {shlex.quote(scenario)}" for scenario in options.scenarios)
     if options.families:
         parts.append(f"--families {','.join(options.families)}")

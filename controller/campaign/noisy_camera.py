@@ -20,18 +20,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.camera import SimulatedCameraConfig
-from config.robot import Robot
 from controller.campaign.noise_model import NoiseModel
 from controller.campaign.noisy_tracks import NoisyTracks
 from controller.campaign.stage import Stage
 from controller.campaign.view import PlanarCamera, PlanarView
 from hal.clocks import NS_PER_S
 from hal.compiled import compiled
-from hal.geometry import camera_in_body
-from hal.types import CameraMount, FloatArray, PlanarPose, Pose
+from hal.geometry import camera_in_body, mount_of
+from hal.types import FloatArray, PlanarPose, Pose
 from vision.scene import CameraCondition, CameraHealth, EgoMotion, FreeSpace, Scene
-
-__all__ = ["NoiseModel", "NoisyCamera", "mount_of"]
 
 _GOOD = CameraHealth(CameraCondition.GOOD, "", 0.95)
 
@@ -96,12 +93,6 @@ class NoisyCamera:
             up_tan=planar_camera.up_tan,
             blank=blank,
         )
-
-
-def mount_of(robot: Robot) -> CameraMount:
-    """The mount of the robot's camera."""
-    mount = robot.camera_mount
-    return CameraMount(mount.forward_m, mount.left_m, mount.height_m, mount.pitch_rad)
 
 
 @compiled(PlanarView, PlanarCamera, NoiseModel, "boolean[::1], boolean[::1], float64[::1], float64")

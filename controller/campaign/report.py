@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import math
+import shlex
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import cv2
 
 from config.faults import Faults
+from config.loader import CONFIG_DIR
 from config.scenario import Scenario
 from controller.campaign.figures import clearance_figure, family_figure, ratio_figure
 from controller.campaign.judge import Row
@@ -51,6 +53,11 @@ def write_report(
         if not cv2.imwrite(str(folder / name), image):
             raise UserError(f"{folder / name}: cannot be written; is the disk full?")
     return summary
+
+
+def config_option_text(config_path: Path) -> str:
+    """The --config of a command that is repeated, with a space before it; "" for the default."""
+    return "" if config_path == CONFIG_DIR / "sim.yaml" else f" --config {shlex.quote(str(config_path))}"
 
 
 def driven_rows(rows: Iterable[Row], own: Mapping[str, Scenario]) -> list[list[str]]:

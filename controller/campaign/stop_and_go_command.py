@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import math
+import shlex
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,6 +19,7 @@ from controller.campaign import stop_and_go
 from controller.campaign.camera_mission import drive_camera
 from controller.campaign.noise_mission import drive_noise
 from controller.campaign.policies import OURS, build_policy
+from controller.campaign.report import config_option_text
 from controller.campaign.stage import Stage
 from controller.campaign.stop_and_go import StopAndGo
 from controller.campaign.task import Mode
@@ -125,7 +127,7 @@ def _result_line(target: _Target, results: list[StopAndGo]) -> str:
 def _write(options: StopAndGoOptions, results: dict[int, StopAndGo]) -> None:
     command = (
         f"treadwatch stop-and-go --drives {options.drives} --seed {options.seed} --mode {options.mode} "
-        f"--report {options.report}"
+        f"--report {shlex.quote(str(options.report))}{config_option_text(options.config_path)}"
     )
     lines = ["# Stop and go", "", f"    {command}", ""]
     lines += markdown.section(

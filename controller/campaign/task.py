@@ -17,7 +17,7 @@ from controller.campaign import oracle
 from controller.campaign.camera_mission import drive_camera
 from controller.campaign.judge import JudgeReference, Row, judge
 from controller.campaign.noise_mission import drive_noise
-from controller.campaign.noisy_camera import NoiseModel
+from controller.campaign.noise_model import NoiseModel
 from controller.campaign.policies import build_policy
 from controller.campaign.stage import Stage, sight_limited_speed_mps
 from controller.campaign.view import PlanarCamera

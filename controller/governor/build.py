@@ -8,12 +8,13 @@ from pathlib import Path as FilePath
 from config.app import AppConfig
 from config.governor import GovernorConfig
 from controller.answer import BaseAnswer
-from controller.build import build_path, mount_of
+from controller.build import build_path
 from controller.governor.governor import SpeedGovernor
 from controller.governor.inbox import Inbox
 from controller.governor.loop import Commands, GovernorLoop
 from controller.localise import Localiser
 from hal.api import Chassis, DatagramLink
+from hal.geometry import mount_of
 
 
 def build_governor(config: AppConfig) -> SpeedGovernor:
@@ -22,7 +23,7 @@ def build_governor(config: AppConfig) -> SpeedGovernor:
         config.governor or GovernorConfig(),
         config.decision,
         config.robot,
-        mount_of(config),
+        mount_of(config.robot),
         1.0 / config.runner.control_rate_hz,
         config.perception.depth_noise,
     )
@@ -34,7 +35,8 @@ def build_governor_loop(
     """A governor's control loop. chassis: opened elsewhere. Raises ConfigError, PathError."""
     start = build_path(config, config_path).start
     answer = BaseAnswer(config.decision.chassis_delay_s, config.robot.limits.max_speed_mps)
-    return GovernorLoop(build_governor(config), commands, Localiser(start, mount_of(config)), chassis, answer)
+    localiser = Localiser(start, mount_of(config.robot))
+    return GovernorLoop(build_governor(config), commands, localiser, chassis, answer)
 
 
 def build_inbox(link: DatagramLink, config: GovernorConfig, warn: Callable[[str], None]) -> Inbox:

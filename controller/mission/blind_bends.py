@@ -19,7 +19,7 @@ from config.decision import DecisionConfig
 from config.path import ArcSpec, LineSpec, PathSpec
 from config.robot import Robot
 from controller import braking
-from controller.build import build_path, mount_of, path_spec
+from controller.build import build_path, path_spec
 from controller.decision.bodies import no_bodies
 from controller.decision.corridor import Corridor
 from controller.decision.limits import min_start_mps
@@ -27,6 +27,7 @@ from controller.decision.sight import Sight
 from controller.decision.surfaces import NO_SURFACES
 from controller.path.path import Path
 from hal.clocks import NS_PER_S
+from hal.geometry import mount_of
 from hal.types import CameraMount, FloatArray
 from vision.scene import FreeSpace
 
@@ -95,7 +96,7 @@ def blind_bend_warning(config: AppConfig, config_path: FilePath) -> str | None:
         return None
     where, spec = path_spec(config, config_path)
     path = build_path(config, config_path)
-    check = BendCheck(config.robot, mount_of(config), view, config.decision)
+    check = BendCheck(config.robot, mount_of(config.robot), view, config.decision)
     bend = check.first_blind_bend(spec, path)
     if bend is None:
         return None

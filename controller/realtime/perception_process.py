@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path as FilePath
 
 from config.app import AppConfig, RealtimeRunner
-from controller.build import build_path, build_perceiver, mount_of, open_camera, surroundings
+from controller.build import build_path, build_perceiver, open_camera, surroundings
 from controller.control import ControlStep
 from controller.errors import UserError
 from controller.localise import PoseHistory
@@ -22,7 +22,7 @@ from controller.record.recorder import RecordingOptions, RunRecorder, open_recor
 from controller.terminal.outlet import say
 from hal.clocks import NS_PER_S, MonotonicClock
 from hal.errors import EndOfStream, FrameTimeout, HalError
-from hal.geometry import advance_pose, body_in_floor, camera_in_floor, planar
+from hal.geometry import advance_pose, body_in_floor, camera_in_floor, mount_of, planar
 from hal.types import CameraMount, PlanarPose, Pose
 
 # A pose after the newest control step is extrapolated with the last twist for at most this long.
@@ -144,7 +144,7 @@ def _look_until_the_end(
     assert isinstance(config.runner, RealtimeRunner)
     timeout_s = config.runner.frame_timeout_s
     path = build_path(config, config_path)
-    body = RemoteBody(channel, mount_of(config), path.start)
+    body = RemoteBody(channel, mount_of(config.robot), path.start)
     with (
         open_camera(config, config_path, MonotonicClock(), body.true_pose, start_ns) as camera,
         open_recorder(recording, surroundings(config), partial(_say_cut_off, channel)) as recorder,

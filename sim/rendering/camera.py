@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from types import TracebackType
 from typing import Self
 
@@ -106,12 +107,7 @@ class SimulatedCamera:
         """The true pose of the optical frame in the floor's frame, with vibration."""
         amplitude = math.radians(self._config.vibration_deg)
         phase = 2.0 * math.pi * self._config.vibration_hz * (stamp_ns - self._start_ns) / NS_PER_S
-        mount = CameraMount(
-            self._mount.forward_m,
-            self._mount.left_m,
-            self._mount.height_m,
-            self._mount.pitch_rad + amplitude * math.sin(phase),
-        )
+        mount = replace(self._mount, pitch_rad=self._mount.pitch_rad + amplitude * math.sin(phase))
         return camera_in_floor(self._body_pose(stamp_ns), mount)
 
     def _expose(self, stamp_ns: int) -> RgbdFrame:

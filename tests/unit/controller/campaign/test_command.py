@@ -3,6 +3,7 @@ from __future__ import annotations
 import importlib.util
 import json
 import re
+import shlex
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import pytest
 from click.testing import CliRunner
 
 from config.loader import CONFIG_DIR
+from controller.campaign.command import CampaignOptions, command_line
 from controller.campaign.plan import Mission, missions, run_local
 from controller.campaign.store import MISSIONS, SETTINGS
 from controller.campaign.task import Task, run_task
@@ -101,6 +103,24 @@ def test_ours_drives_a_mission_the_same_way_twice() -> None:
     assert first == again
     assert first[0].reached
     assert first[0].limit_violations == 0
+
+
+def test_the_report_gives_the_command_that_repeats_it() -> None:
+    options = CampaignOptions(
+        Path("my robot.yaml"),
+        4,
+        ("group",),
+        ("ours",),
+        "camera",
+        3,
+        7,
+        Path("out/a b"),
+        scenarios=("my.yaml",),
+    )
+    again = cli.commands["campaign"].make_context("campaign", shlex.split(command_line(options))[2:]).params
+    assert (again["config_path"], again["report"]) == (Path("my robot.yaml"), Path("out/a b"))
+    assert (again["missions"], again["mode"], again["workers"], again["seed"]) == (4, "camera", 3, 7)
+    assert (again["families"], again["policies"], again["scenarios"]) == ("group", "ours", ("my.yaml",))
 
 
 def test_missions_take_turns_over_the_families() -> None:

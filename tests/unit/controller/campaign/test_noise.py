@@ -8,12 +8,13 @@ import pytest
 from config.camera import SimulatedCameraConfig
 from config.faults import Faults
 from controller.campaign.noise_mission import drive_noise
-from controller.campaign.noisy_camera import NoiseModel, NoisyCamera, mount_of
+from controller.campaign.noise_model import NoiseModel
+from controller.campaign.noisy_camera import NoisyCamera
 from controller.campaign.policies import build_policy
 from controller.campaign.stage import Stage
 from controller.decision.decision import Decision
 from controller.decision.situation import Situation
-from hal.geometry import camera_in_floor
+from hal.geometry import camera_in_floor, mount_of
 from hal.types import PlanarPose
 from tests.support.campaign import CONFIG, crate, frozen, late, mover, silent, stage
 from vision.scene import CameraCondition, Scene

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from config.scenario import Beam, Pallet
-from controller.campaign.noisy_camera import mount_of
 from controller.campaign.paper_rule import PaperRule
 from controller.campaign.planar_scan import PlanarScanner
 from controller.campaign.protective_field import ProtectiveField
@@ -14,6 +13,7 @@ from controller.campaign.zone_monitor import ZoneMonitor
 from controller.decision.decision import Action, Decision
 from controller.decision.situation import Situation
 from controller.path.path import OnPath
+from hal.geometry import mount_of
 from hal.types import FloatArray, PlanarPose
 from tests.support import scenes
 from tests.support.campaign import CONFIG, crate, stage

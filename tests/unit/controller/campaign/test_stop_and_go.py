@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import shlex
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from config.robot import Robot
 from controller import braking
 from controller.campaign.stop_and_go import DriveRecording, StopAndGo, measure, read, write
 from controller.campaign.stop_and_go_command import TARGETS, StopAndGoOptions, run_stop_and_go
+from controller.cli.commands import cli
 from controller.errors import UserError
 
 DT_S = 0.02
@@ -137,6 +139,17 @@ def test_our_drives_reach_the_targets_and_the_report_is_the_same_twice(
     report = (tmp_path / "a" / "report.md").read_text()
     assert "| 3 | " in report
     assert "| hold, share | median 1.000" in report
+
+
+def test_the_report_gives_the_command_that_repeats_it(tmp_path: Path) -> None:
+    config = tmp_path / "my robot.yaml"
+    config.write_text((CONFIG_DIR / "sim.yaml").read_text())
+    run_stop_and_go(replace(options(tmp_path / "out"), config_path=config))
+    given = shlex.split(json.loads((tmp_path / "out" / "summary.json").read_text())["command"])
+    again = cli.commands["stop-and-go"].make_context("stop-and-go", given[2:]).params
+    assert again["config_path"] == config
+    assert (again["drives"], again["seed"], again["mode"]) == (1, 3, "noise")
+    assert again["report"] == tmp_path / "out"
 
 
 def test_a_robot_without_a_simulation_cannot_be_measured(tmp_path: Path) -> None:
