@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from config.scenario import BodySpec, Scenario
 from hal.geometry import body_in_floor
-from hal.types import FloatArray, PlanarPose
+from hal.types import FloatArray, PlanarPose, Pose
 from sim.models.bodies import BodyModel, build_body
 from sim.models.building import build_room
 from sim.models.mesh import Faces, join, normals
@@ -89,14 +89,15 @@ class World:
         moving_parts = [(body.id, faces) for body in self._movers for faces in body.model.parts]
         moving = join([faces for _, faces in moving_parts])
         self._last_poses: dict[int, tuple[MotionState, FloatArray, FloatArray]] = {}
-        self._compile(fixed, moving)
-        self._still_count = len(fixed)
+        self._join(fixed, moving)
+        self._still_face_count = len(fixed)
         owners = [id_ for id_, faces in (*parts, *moving_parts) for _ in range(len(faces))]
         self._body_of_face = np.array(owners, dtype=np.uint16)
         part_sizes = [len(faces) for _, faces in moving_parts]
         self._part_of_face = np.repeat(np.arange(len(part_sizes)), part_sizes)
 
-    def _compile(self, fixed: Faces, moving: Faces) -> None:
+    def _join(self, fixed: Faces, moving: Faces) -> None:
+        """All faces in one set of arrays, those of the movers last."""
         keys = fixed.textures + moving.textures
         self.textures: tuple[str, ...] = tuple(dict.fromkeys(keys))
         index_of = {key: index for index, key in enumerate(self.textures)}
@@ -109,8 +110,8 @@ class World:
         """Every face at t_s."""
         corners, rotated_normals = self._corners.copy(), self._normals.copy()
         if self._movers:
-            rotations, translations = self._part_poses(t_s)
-            part_index, first_moving = self._part_of_face, self._still_count
+            rotations, translations = self._mover_poses(t_s)
+            part_index, first_moving = self._part_of_face, self._still_face_count
             rotation = rotations[part_index]
             corners[first_moving:] = np.matmul(self._corners[first_moving:], rotation.transpose(0, 2, 1))
             corners[first_moving:] += translations[part_index][:, None, :]
@@ -124,7 +125,8 @@ class World:
         still = self._still_states
         return tuple(still.get(body.id) or _state(body, t_s) for body in self._bodies)
 
-    def _part_poses(self, t_s: float) -> tuple[FloatArray, FloatArray]:
+    def _mover_poses(self, t_s: float) -> tuple[FloatArray, FloatArray]:
+        """Rotations (P, 3, 3) and translations (P, 3) of the parts of all movers."""
         poses = [self._poses_of(body, t_s) for body in self._movers]
         rotations, translations = zip(*poses, strict=True)
         return np.concatenate(rotations), np.concatenate(translations)
@@ -135,8 +137,7 @@ class World:
         last = self._last_poses.get(body.id)
         if last is not None and last[0] == state:  # it stands still
             return last[1:]
-        outer = body_in_floor(PlanarPose(state.x_m, state.y_m, state.heading_rad))
-        poses = [outer @ part for part in body.model.pose_parts(state)]
+        poses = _part_poses(body, state)
         rotations = np.array([pose.rotation for pose in poses])
         translations = np.array([pose.translation_m for pose in poses])
         self._last_poses[body.id] = state, rotations, translations
@@ -153,10 +154,14 @@ def trajectory_of(spec: BodySpec, seed: int) -> Trajectory:
     return Trajectory(start, spec.motion, jitter_s)
 
 
-def _placed_parts(body: _Body, t_s: float) -> list[Faces]:
-    state = body.trajectory.at(t_s)
+def _part_poses(body: _Body, state: MotionState) -> list[Pose]:
+    """The poses of a body's parts in the frame of the floor."""
     outer = body_in_floor(PlanarPose(state.x_m, state.y_m, state.heading_rad))
-    poses = [outer @ part for part in body.model.pose_parts(state)]
+    return [outer @ part for part in body.model.pose_parts(state)]
+
+
+def _placed_parts(body: _Body, t_s: float) -> list[Faces]:
+    poses = _part_poses(body, body.trajectory.at(t_s))
     return [
         faces.moved(pose.rotation, pose.translation_m)
         for faces, pose in zip(body.model.parts, poses, strict=True)

@@ -7,7 +7,7 @@ The files in the order in which they come into play:
 * scripted_drive.py - the robot's motion, its odometry, the camera mount
 * scenes.py - the movers of a sequence, in one of the places
 * places.py - hall, aisle and workshop: the room, what is fixed in it, and clutter
-* campaign.py - runs all sequences on several processes
+* run_set.py - runs all sequences on several processes
 * run_sequence.py - runs all methods on one sequence; renders each frame once
 * simulate.py - the frames of a sequence: image, odometry, truth
 * truth.py - the truth about one frame

@@ -15,7 +15,6 @@ from config.app import ReplayConfig
 from config.camera import OdometryChoice
 from controller.build import open_replay
 from controller.errors import UserError
-from controller.evaluation.campaign import Baselines, plan, run_campaign
 from controller.evaluation.markdown import fixed
 from controller.evaluation.recording_report import (
     recording_lines,
@@ -26,6 +25,7 @@ from controller.evaluation.recordings import RecordingRecord, distinct_names, ev
 from controller.evaluation.report import prepare_folder, write_failures, write_figures, write_texts
 from controller.evaluation.report_text import simulated_lines
 from controller.evaluation.run_sequence import SequenceRecord
+from controller.evaluation.run_set import Baselines, plan, run_set
 from controller.evaluation.sequences import Sequence, sequences
 from controller.evaluation.summary import Summary, as_json, summarise
 from controller.evaluation.targets import TARGETS
@@ -102,7 +102,7 @@ def _simulated(options: EvaluationOptions, selected: tuple[Sequence, ...]) -> tu
     with click.progressbar(
         length=len(tasks), label="simulated sequences", file=sys.stderr, hidden=_hidden(options)
     ) as bar:
-        return run_campaign(tasks, options.workers, lambda _: bar.update(1))
+        return run_set(tasks, options.workers, lambda _: bar.update(1))
 
 
 def _recording(options: EvaluationOptions, folder: Path, name: str) -> RecordingRecord:

@@ -61,7 +61,7 @@ def count_pixels(
 ) -> PixelCounts:
     """Histograms of the levels, for moving pixels and for the rest.
 
-    levels, instances, depth_m: (H / 2, W / 2) levels from claimed(), body ids, true depth.
+    levels, instances, depth_m: (H / 2, W / 2) levels from claimed_levels(), body ids, true depth.
     moving, excused: ids of bodies that move, and of those whose pixels do not count.
     """
     judged = (depth_m > 0.0) & (depth_m <= MAX_DISTANCE_M)

@@ -38,7 +38,7 @@ TRACKING = "object tracking"
 LOW_RANK = "low rank and sparse"
 DENSE_FLOW = "dense flow minus rigid flow"
 
-# ALWAYS runs on every sequence, BASELINES on some unless asked for (controller/evaluation/campaign.py).
+# ALWAYS runs on every sequence, BASELINES on some unless asked for (controller/evaluation/run_set.py).
 ALWAYS = (OURS, OURS_ALONE, LIDAR)
 BASELINES = (BACKGROUND, TRAJECTORIES, TRACKING, LOW_RANK, DENSE_FLOW)
 

@@ -14,18 +14,18 @@ import numpy as np
 import pytest
 
 from controller.errors import UserError
-from controller.evaluation.campaign import (
-    BASELINE_SEQUENCES,
-    SHOWN_FRAMES,
-    Task,
-    plan,
-    run_campaign,
-    run_task,
-)
 from controller.evaluation.markdown import fixed, section, table
 from controller.evaluation.report import prepare_folder, write_failures, write_figures, write_texts
 from controller.evaluation.report_text import simulated_lines
 from controller.evaluation.run_sequence import SequenceRecord, run_sequence
+from controller.evaluation.run_set import (
+    BASELINE_SEQUENCES,
+    SHOWN_FRAMES,
+    Task,
+    plan,
+    run_set,
+    run_task,
+)
 from controller.evaluation.sequences import sequences
 from controller.evaluation.summary import as_json, summarise
 from controller.evaluation.targets import TARGETS
@@ -91,7 +91,7 @@ def test_two_runs_see_the_same(records: tuple[SequenceRecord, ...]) -> None:
 def test_a_worker_says_what_a_direct_call_says() -> None:
     task = Task(STILL, (LIDAR,))
     told: list[str] = []
-    (record,) = run_campaign((task,), 1, lambda one: told.append(one.name))
+    (record,) = run_set((task,), 1, lambda one: told.append(one.name))
     direct = run_task(task)
     assert told == [STILL.name]
     positions = [
@@ -209,6 +209,6 @@ def killed(_: Task) -> SequenceRecord:
 
 
 def test_a_worker_that_died_is_told_with_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("controller.evaluation.campaign.run_task", killed)
+    monkeypatch.setattr("controller.evaluation.run_set.run_task", killed)
     with pytest.raises(UserError, match="--workers 1"):
-        run_campaign((Task(STILL, (LIDAR,)),), 2, lambda _: None)
+        run_set((Task(STILL, (LIDAR,)),), 2, lambda _: None)

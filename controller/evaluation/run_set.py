@@ -62,7 +62,7 @@ def _with_baselines(name: str, baselines: Baselines) -> bool:
     return baselines == "all" or (baselines == "some" and name in BASELINE_SEQUENCES)
 
 
-def run_campaign(
+def run_set(
     tasks: tuple[Task, ...], workers: int, on_done: Callable[[SequenceRecord], None]
 ) -> tuple[SequenceRecord, ...]:
     """One record a sequence, sorted by name. Apart from times they do not depend on the number of workers.
