@@ -5,6 +5,7 @@ models/ - shapes, bodies and textures
 motion.py - where a moving body is at any time
 world.py - all faces and bodies of a scenario at any time
 planar.py - the same world from above, without faces
+polygons.py - distances of convex polygons
 plant.py - the motion of a tracked base
 emulators/ - chassis at the other end of a link, each with a plant
 rendering/ - the camera's images of a world, and their ground truth

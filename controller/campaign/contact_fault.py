@@ -12,7 +12,7 @@ from controller.campaign.stage import Stage
 from controller.campaign.view import PlanarCamera
 from controller.profile import SpeedRamps
 from hal.types import FloatArray, PlanarPose
-from sim.planar import overlap
+from sim.polygons import overlap
 
 AT_FAULT_MPS = 0.02
 _STEPS_PER_LOOK = 5

@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.campaign.drive_log import DriveLog
-from controller.campaign.stage import Stage, body_radius, enclosing_circles
+from controller.campaign.stage import Stage, enclosing_circles
 from hal.compiled import compiled
 from hal.types import FloatArray
-from sim.planar import separation
+from sim.contact import body_radius
+from sim.polygons import separation
 
 # Two bodies approach each other by less than this between two control steps.
 _MAX_APPROACH_M = 0.15

@@ -8,13 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.app import AppConfig, LockstepRunner
-from config.robot import Body, Robot
+from config.robot import Robot
 from controller import braking
 from controller.path.path import Path
 from hal.compiled import compiled
 from hal.types import FloatArray, PlanarPose
+from sim.contact import body_radius, robot_footprints
 from sim.families import Case
-from sim.planar import PlanarWorld, overlap
+from sim.planar import PlanarWorld
+from sim.polygons import overlap
 
 _TABLE_STEP_M = 0.02
 _SWEEP_STEP_M = 0.05
@@ -39,7 +41,7 @@ class Stage:
 
     def robot_polygons(self, poses: FloatArray) -> FloatArray:
         """The robot's rectangles (T, 4, 2) at poses (T, 3): x, y, heading."""
-        return rectangles(self.robot.body, poses)
+        return robot_footprints(self.robot.body, poses)
 
     def path_poses(self, s_m: FloatArray) -> FloatArray:
         """Poses (T, 3) of the path at s_m (T,)."""
@@ -64,11 +66,6 @@ class Stage:
                 for step_intervals in [intervals[t]] if moves else intervals:
                     step_intervals.append(interval)
         return intervals
-
-
-def body_radius(body: Body) -> float:
-    """The radius of the circle around the turning centre that encloses the robot."""
-    return math.hypot(max(body.front_m, body.rear_m), 0.5 * body.width_m)
 
 
 @compiled("float64[:, :, :]")
@@ -134,17 +131,6 @@ def _runs(time_index: NDArray[np.intp], pose_index: NDArray[np.intp]) -> list[tu
         (int(time_index[a]), (int(pose_index[a]), int(pose_index[b])))
         for a, b in zip(firsts, lasts, strict=True)
     ]
-
-
-def rectangles(body: Body, poses: FloatArray) -> FloatArray:
-    """Corners (T, 4, 2), counter-clockwise, of a robot with its turning centre at poses (T, 3)."""
-    x = np.array([body.front_m, body.front_m, -body.rear_m, -body.rear_m])
-    y = 0.5 * body.width_m * np.array([-1.0, 1.0, 1.0, -1.0])
-    cos, sin = np.cos(poses[:, 2:3]), np.sin(poses[:, 2:3])
-    return np.stack(
-        (poses[:, 0:1] + cos * x - sin * y, poses[:, 1:2] + sin * x + cos * y),
-        axis=2,
-    )
 
 
 def sight_limited_speed_mps(config: AppConfig) -> float:

@@ -2,14 +2,13 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 import pytest
 
 from config.path import LineSpec, PathSpec
 from config.robot import Body
 from config.scenario import Beam, BodySpec, Column, Crate, Go, MotionPlan, Pallet, Room, Scenario
 from hal.types import PlanarPose
-from sim.contact import nearest_body, polygon_distance, robot_footprint
+from sim.contact import nearest_body, robot_footprint
 from sim.world import World
 
 ROBOT = Body()  # 0.78 wide, 1.02 long, 0.51 behind the centre, 0.80 high, 0.05 clear
@@ -19,33 +18,6 @@ PATH = PathSpec(segments=(LineSpec(kind="line", length_m=5.0),))
 
 def world(*bodies: BodySpec) -> World:
     return World(Scenario(name="test", path=PATH, bodies=bodies))
-
-
-def square(x: float, y: float, side: float = 1.0) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-    h = 0.5 * side
-    return np.array([[x + h, y - h], [x + h, y + h], [x - h, y + h], [x - h, y - h]])
-
-
-def test_distance_between_squares_side_by_side() -> None:
-    assert polygon_distance(square(0, 0), square(3, 0)) == pytest.approx(2.0)
-
-
-def test_distance_from_corner_to_corner() -> None:
-    assert polygon_distance(square(0, 0), square(4, 5)) == pytest.approx(5.0)  # 3 and 4 apart
-
-
-def test_distance_from_corner_to_side() -> None:
-    diamond = np.array([[3.0, -1.0], [4.0, 0.0], [3.0, 1.0], [2.0, 0.0]])
-    assert polygon_distance(square(0, 0), diamond) == pytest.approx(1.5)
-    assert polygon_distance(diamond, square(0, 0)) == pytest.approx(1.5)
-
-
-def test_overlap_is_the_shortest_way_out() -> None:
-    assert polygon_distance(square(0, 0), square(0.9, 0.3)) == pytest.approx(-0.1)
-
-
-def test_touching_sides_have_no_distance() -> None:
-    assert polygon_distance(square(0, 0), square(1, 0)) == pytest.approx(0.0)
 
 
 def test_robot_rectangle_turns_about_its_turning_centre() -> None:

@@ -1,8 +1,5 @@
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 
@@ -22,9 +19,7 @@ from config.scenario import (
     Shelf,
     Wall,
 )
-from hal.types import FloatArray
-from sim.contact import polygon_distance
-from sim.planar import PlanarWorld, overlap, separation
+from sim.planar import PlanarWorld
 from sim.world import World
 
 MOTION = MotionPlan(
@@ -94,32 +89,3 @@ def test_end_is_when_the_last_mover_has_arrived() -> None:
     assert np.abs(before).max() > 0.05
     assert np.abs(after).max() == 0.0
     assert PlanarWorld(SCENARIO.model_copy(update={"bodies": ()})).end_s == 0.0
-
-
-def test_separation_is_the_exact_distance_of_every_pair() -> None:
-    random = np.random.default_rng(3)
-
-    def box(count: int) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-        angle = random.uniform(0.0, math.tau, count)
-        half = random.uniform(0.1, 1.0, (count, 2))
-        corners = np.array([[1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0]]) * half[:, None]
-        cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
-        turned = np.stack(
-            (cos * corners[..., 0] - sin * corners[..., 1], sin * corners[..., 0] + cos * corners[..., 1]), 2
-        )
-        return turned + random.uniform(-1.5, 1.5, (count, 1, 2))
-
-    a, b = box(200), box(200)
-    padded = np.concatenate((b, np.repeat(b[:, -1:], 3, axis=1)), axis=1)
-    exact = [polygon_distance(one, other) for one, other in zip(a, b, strict=True)]
-    assert min(exact) < -0.1
-    assert max(exact) > 0.5
-    assert separation(a, padded) == pytest.approx(np.array(exact), abs=1e-9)
-    assert overlap(a, padded).tolist() == [distance <= 0.0 for distance in exact]
-
-
-@pytest.mark.parametrize("measure", [separation, overlap])
-def test_polygons_without_a_partner_are_refused(measure: Callable[[FloatArray, FloatArray], object]) -> None:
-    square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
-    with pytest.raises(ValueError, match="2 polygons cannot be paired with 1"):
-        measure(np.stack((square, square)), square[None])

@@ -8,7 +8,7 @@ import pytest
 from controller.campaign import oracle
 from controller.campaign.stage import Stage, sight_limited_speed_mps
 from sim.families import FAMILY_NAMES, generate
-from sim.planar import separation
+from sim.polygons import separation
 from tests.support.campaign import CONFIG
 
 TOP_MPS = sight_limited_speed_mps(CONFIG)

@@ -16,7 +16,7 @@ from controller.campaign.oracle import OracleTime
 from controller.campaign.stage import Stage
 from controller.campaign.task import judge_reference
 from controller.decision.decision import Action
-from sim.planar import separation
+from sim.polygons import separation
 from tests.support.campaign import CONFIG, crate, frozen, late, log_of, mover, silent, stage
 
 UP, DOWN, KEEP = Action.INCREASE, Action.DECREASE, Action.KEEP
