@@ -16,7 +16,9 @@ _STEP_NS = 1_000_000
 
 
 @dataclass(slots=True)
-class _Track:
+class Track:
+    """One track, or the whole base along its path: its speed follows target_mps with lag."""
+
     target_mps: float = 0.0
     speed_mps: float = 0.0
     travel_m: float = 0.0
@@ -45,8 +47,8 @@ class TrackedPlant:
         self._nominal = TrackGeometry(config.track_width_m)
         self._true = TrackGeometry(config.track_width_m, config.slip_factor)
         self._distance_scale = 1.0 + config.distance_slip
-        self._left = _Track()
-        self._right = _Track()
+        self._left = Track()
+        self._right = Track()
         self._x_m, self._y_m, self._heading_rad = (
             (0.0, 0.0, 0.0) if pose is None else (pose.x_m, pose.y_m, pose.heading_rad)
         )

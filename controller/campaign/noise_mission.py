@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from controller.shape import SpeedShaper
 from hal.clocks import NS_PER_S
 from hal.compiled import compiled
 from hal.types import FloatArray, PlanarPose, Setpoint
+from sim.plant import Track
 from vision.scene import CameraCondition, CameraHealth, Scene
 
 # If the robot still stands this long after everything else has come to rest, it will stand for ever.
@@ -36,23 +37,6 @@ _OFFSET_TIME_CONSTANT_S = 2.0
 _ODOMETRY_SIGMA = 0.003
 _FEEDBACK_TIMEOUT_S = 0.2
 _FROZEN_FRAMES = 2
-
-
-@dataclass(slots=True)
-class _Base:
-    """The base on its path: its true position and speed along the path."""
-
-    lag_s: float
-    max_accel_mps2: float
-    s_m: float = 0.0
-    v_mps: float = 0.0
-
-    def advance(self, command_mps: float, dt_s: float) -> None:
-        change = (command_mps - self.v_mps) * -math.expm1(-dt_s / self.lag_s)
-        limit = self.max_accel_mps2 * dt_s
-        change = min(max(change, -limit), limit)
-        self.s_m += (self.v_mps + 0.5 * change) * dt_s
-        self.v_mps += change
 
 
 @compiled("int64, float64, float64")
@@ -135,7 +119,7 @@ class _NoiseDrive:
         self._camera_link = _DelayedCamera(
             NoisyCamera(stage, config.camera, seed), stage, fps, config.runner.perception_latency_s
         )
-        self._base = _Base(plant.lag_s, plant.max_accel_mps2)
+        self._plant, self._base = plant, Track()
         self._shaper = SpeedShaper(config.robot.limits, self._dt_s, config.decision.chassis_delay_s)
         self._log = DriveLog(SetpointTally(config.robot.limits, self._dt_s))
         self._standing_s = 0.0
@@ -145,9 +129,9 @@ class _NoiseDrive:
         """Run control steps until the drive is over."""
         for k, offset_m in enumerate(self._lateral_offsets_m.tolist()):
             t_s = k * self._dt_s
-            pose = self._stage.pose(self._base.s_m, offset_m)
+            pose = self._stage.pose(self._base.travel_m, offset_m)
             decision = self._decide(t_s, pose, offset_m)
-            self._log.add(t_s, pose, self._base.s_m, self._base.v_mps, decision)
+            self._log.add(t_s, pose, self._base.travel_m, self._base.speed_mps, decision)
             self._move(t_s, decision)
             if self._is_over(t_s):
                 break
@@ -156,7 +140,7 @@ class _NoiseDrive:
     @property
     def _odometry_s_m(self) -> float:
         """The position along the path by odometry."""
-        return self._base.s_m * self._odometry_scale
+        return self._base.travel_m * self._odometry_scale
 
     def _decide(self, t_s: float, pose: PlanarPose, offset_m: float) -> Decision:
         """The decision of one control step. pose: the true one; the policy gets the pose by odometry."""
@@ -170,7 +154,7 @@ class _NoiseDrive:
                 self._stage.path,
                 odometry_pose,
                 OnPath(odometry_s_m, offset_m, 0.0),
-                max(self._shaper.v_mps, self._base.v_mps),
+                max(self._shaper.v_mps, self._base.speed_mps),
                 self._shaper.a_mps2,
                 round(t_s * NS_PER_S),
             )
@@ -179,7 +163,7 @@ class _NoiseDrive:
     def _move(self, t_s: float, decision: Decision) -> None:
         if self._has_lost_feedback(t_s):
             # The driver has stopped the base (hal/chassis/arming.py); only consent would end that.
-            self._base.advance(0.0, self._dt_s)
+            self._advance_base(0.0)
             return
         shaped = self._shaper.step(
             decision.target_speed_mps,
@@ -187,7 +171,11 @@ class _NoiseDrive:
             distance_to_end_m=self._stage.path.length_m - self._odometry_s_m,
         )
         self._log.setpoints.add(Setpoint(round(t_s * NS_PER_S), shaped.v_mps, shaped.a_mps2, 0.0))
-        self._base.advance(shaped.v_mps, self._dt_s)
+        self._advance_base(shaped.v_mps)
+
+    def _advance_base(self, command_mps: float) -> None:
+        self._base.target_mps = command_mps
+        self._base.advance(self._dt_s, self._plant.lag_s, self._plant.max_accel_mps2)
 
     def _has_lost_feedback(self, t_s: float) -> bool:
         lost_s = self._faults.feedback_lost_s
@@ -195,7 +183,7 @@ class _NoiseDrive:
 
     def _is_over(self, t_s: float) -> bool:
         """Whether the robot is at rest, and on the target, stopped for good, or given up."""
-        if self._base.v_mps >= _STANDING_MPS:
+        if self._base.speed_mps >= _STANDING_MPS:
             self._standing_s = 0.0
             return False
         self._standing_s += self._dt_s

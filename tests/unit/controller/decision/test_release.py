@@ -33,6 +33,32 @@ class Gate:
         return self.target
 
 
+def rolling() -> Gate:
+    """At 0.1 m/s, which is all that has been allowed for long."""
+    gate = Gate(0.1)
+    gate.step(1.0)
+    gate.hold(0.1, 3.0)
+    gate.v = 0.1
+    return gate
+
+
+def standing() -> Gate:
+    """At rest for long, because the way was blocked."""
+    gate = Gate(0.0)
+    gate.step(1.0)
+    gate.hold(0.0, 3.0)
+    gate.v = 0.0
+    return gate
+
+
+def released_after_s(gate: Gate) -> float:
+    """For how long the way must be free up to 1.5 m/s until the target rises above the speed."""
+    began_ns = gate.now_ns
+    while gate.step(1.5) <= gate.v + 1e-9:
+        assert gate.now_ns - began_ns < 3e9
+    return (gate.now_ns - began_ns) / 1e9
+
+
 def test_the_first_way_is_free_at_once() -> None:
     assert Gate(v=0.0).step(1.5) == 1.5
 
@@ -45,11 +71,7 @@ def test_a_falling_target_is_passed_on_at_once() -> None:
 
 def test_a_rising_target_waits_for_a_free_way() -> None:
     """From standstill the decrease is long ago: only delay_s counts."""
-    gate = Gate(0.0)
-    gate.step(1.0)
-    gate.step(0.0)
-    gate.v = 0.0
-    assert gate.hold(0.0, 3.0) == 0.0
+    gate = standing()
     assert gate.hold(0.2, 0.28) == 0.0
     assert gate.hold(0.2, 0.06) == 0.2
 
@@ -60,21 +82,9 @@ def test_release_to_a_much_higher_speed_waits_less_long() -> None:
     assert gate.hold(0.6, 0.06) == 0.6
 
 
-def rolling() -> Gate:
-    """At 0.1 m/s, which is all that has been allowed for long."""
-    gate = Gate(0.1)
-    gate.step(1.0)
-    gate.hold(0.1, 3.0)
-    gate.v = 0.1
-    return gate
-
-
 def test_release_from_rest_never_waits_less_long() -> None:
     """Who follows somebody that has just gone by comes into view right before the nose."""
-    gate = Gate(0.0)
-    gate.step(1.0)
-    gate.hold(0.0, 3.0)
-    gate.v = 0.0
+    gate = standing()
     assert gate.hold(1.5, 0.28) == 0.0
     assert gate.hold(1.5, 0.06) == 1.5
 
@@ -99,10 +109,7 @@ def test_a_break_in_the_free_way_starts_the_delay_anew() -> None:
 def test_no_increase_sooner_than_hold_after_a_decrease_began() -> None:
     gate = Gate(1.0)
     gate.step(0.3)
-    began = gate.now_ns
-    while gate.step(1.5) <= gate.v + 1e-9:
-        assert gate.now_ns - began < 3e9
-    assert (gate.now_ns - began) / 1e9 == pytest.approx(2.0, abs=0.05)
+    assert released_after_s(gate) == pytest.approx(2.0, abs=0.05)
 
 
 def test_while_it_waits_it_does_not_go_on_braking() -> None:
@@ -140,17 +147,11 @@ def test_stepping_down_further_does_not_begin_the_hold_anew() -> None:
     gate = Gate(1.0)
     gate.hold(0.8, 1.0)
     gate.hold(0.5, 0.9)
-    began = gate.now_ns
-    while gate.step(1.5) <= gate.v + 1e-9:
-        assert gate.now_ns - began < 3e9
-    assert (gate.now_ns - began) / 1e9 < 0.5
+    assert released_after_s(gate) < 0.5
 
 
 def test_released_speed_rises_to_the_minimum_of_the_last_moments() -> None:
-    gate = Gate(0.0)
-    gate.step(1.0)
-    gate.hold(0.0, 3.0)
-    gate.v = 0.0
+    gate = standing()
     for k in range(40):
         target = gate.step(1.4 if k % 2 else 0.7)
     assert target == 0.7
