@@ -213,29 +213,6 @@ def floor_normal(detection: Detection) -> FloatArray | None:
     return None if normal is None else np.asarray(detection.pose.rotation @ normal)
 
 
-def view_radps(detection: Detection, sight: FloatArray, distance_m: FloatArray) -> FloatArray:
-    """(T,) rate at which the camera's translation changes the viewing direction of each track.
-
-    sight (T, 3): unit vectors from the camera to the tracks. distance_m (T,): their distances.
-    """
-    ego = detection.ego_motion
-    if ego.dt_s <= 0.0:
-        return np.zeros(len(sight))
-    way = detection.pose.rotation @ ego.motion.translation_m / ego.dt_s
-    return _turns(way, sight, distance_m)
-
-
-@compiled("float64[:], float64[:, ::1], float64[::1]")
-def _turns(way: FloatArray, sight: FloatArray, distance_m: FloatArray) -> FloatArray:
-    """As view_radps. way (3,): velocity of the camera in the fixed frame, m/s."""
-    squared = way[0] * way[0] + way[1] * way[1] + way[2] * way[2]
-    turn = np.empty(len(sight))
-    for t in range(len(sight)):
-        ahead = sight[t, 0] * way[0] + sight[t, 1] * way[1] + sight[t, 2] * way[2]
-        turn[t] = math.sqrt(max(squared - ahead * ahead, 0.0)) / max(distance_m[t], 0.1)
-    return turn
-
-
 def _at_border(bbox_px: FloatArray, detection: Detection) -> NDArray[np.bool_]:
     """(K,) whether boxes (K, 4) reach the left or right border of the image: the rest may lie outside."""
     step_px = detection.grid.step_px

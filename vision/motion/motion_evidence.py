@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import DepthNoise
+from hal.compiled import compiled
 from hal.types import Flags, FloatArray, Integers, Matrices, Matrix, Vector
 from vision.bodies import sightings
 from vision.bodies.tracks import Tracks
@@ -115,13 +117,36 @@ def evidence_of(
         velocity_measured_s=tracks.velocity_measured_s,
         growth_mps=tracks.growth_mps,
         up=sightings.floor_normal(detection),
-        view_radps=sightings.view_radps(detection, sight, distance_m),
+        view_radps=view_radps(detection, sight, distance_m),
         advances=advances,
         border_is_guess=tracks.border_is_guess,
         trusted=detection.motion_known,
         reckoned=detection.reckoned,
         borne_out=borne_out(detection),
     )
+
+
+def view_radps(detection: Detection, sight: FloatArray, distance_m: FloatArray) -> FloatArray:
+    """(T,) rate at which the camera's translation changes the viewing direction of each track.
+
+    sight (T, 3): unit vectors from the camera to the tracks. distance_m (T,): their distances.
+    """
+    ego = detection.ego_motion
+    if ego.dt_s <= 0.0:
+        return np.zeros(len(sight))
+    way = detection.pose.rotation @ ego.motion.translation_m / ego.dt_s
+    return _turns(way, sight, distance_m)
+
+
+@compiled("float64[:], float64[:, ::1], float64[::1]")
+def _turns(way: FloatArray, sight: FloatArray, distance_m: FloatArray) -> FloatArray:
+    """As view_radps. way (3,): velocity of the camera in the fixed frame, m/s."""
+    squared = way[0] * way[0] + way[1] * way[1] + way[2] * way[2]
+    turn = np.empty(len(sight))
+    for t in range(len(sight)):
+        ahead = sight[t, 0] * way[0] + sight[t, 1] * way[1] + sight[t, 2] * way[2]
+        turn[t] = math.sqrt(max(squared - ahead * ahead, 0.0)) / max(distance_m[t], 0.1)
+    return turn
 
 
 def borne_out(detection: Detection) -> float:
