@@ -211,5 +211,5 @@ def _print_summary(summary: Summary, count: int, took_s: float, folder: Path) ->
             f"flaps {totals.flaps}, outside limits {totals.limit_violations}"
         )
     if count:
-        say(f"speed    {count} missions in {took_s:.1f} s: {count / took_s:.1f} a second")
+        say(f"speed    {count} missions in {took_s:.1f} s: {count / took_s:.2g} a second")
     say(f"report   {folder / 'report.md'}")
