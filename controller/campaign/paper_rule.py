@@ -24,7 +24,7 @@ _STOP_SHORT_M = 0.1
 
 
 class PaperRule:
-    """Policy (b)."""
+    """The policy `paper`."""
 
     def __init__(self, robot: Robot, mount: CameraMount) -> None:
         self._robot, self._mount = robot, mount

@@ -30,7 +30,7 @@ _MIN_POINTS = 2
 
 
 class ProtectiveField:
-    """Policy (d)."""
+    """The policy `field`."""
 
     def __init__(self, robot: Robot, stage: Stage) -> None:
         self._robot = robot

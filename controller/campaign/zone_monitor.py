@@ -28,7 +28,7 @@ _TIME_BEFORE_COLLISION_S, _STEP_S = 2.0, 0.1
 
 
 class ZoneMonitor:
-    """Policy (c)."""
+    """The policy `zones`."""
 
     def __init__(self, robot: Robot, stage: Stage) -> None:
         self._robot = robot
