@@ -9,27 +9,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from config.scenario import (
-    Beam,
-    BodySpec,
-    Column,
-    Crate,
-    Pallet,
-    Person,
-    Pole,
-    RobotBody,
-    Scenario,
-    Shelf,
-    Wall,
-)
+from config.scenario import Person, Scenario
 from hal.types import FloatArray
-from sim.models.bodies import rectangle, regular_polygon
-from sim.models.person import person_footprint
-from sim.models.vehicle import SENSOR_HEIGHT_M
-from sim.motion import MotionState
+from sim.models.outlines import footprint, heights
 from sim.world import trajectory_of
-
-_POLE_SIDES = 8
 
 
 class PlanarWorld:
@@ -122,29 +105,6 @@ class PlanarWorld:
         if speed_mps not in cache:
             cache[speed_mps] = _padded(footprint(self._specs[body], speed_mps), self._corners)
         return cache[speed_mps]
-
-
-def footprint(spec: BodySpec, speed_mps: float) -> FloatArray:
-    """Corners (K, 2) in the body frame, convex, counter-clockwise, of a body that goes at speed_mps."""
-    match spec:
-        case Person():
-            return person_footprint(spec, MotionState(0.0, 0.0, 0.0, speed_mps, 0.0, 0.0, 0.0))
-        case Column():
-            return regular_polygon(spec.sides, 0.5 * spec.diameter_m)
-        case Pole():
-            return regular_polygon(_POLE_SIDES, 0.5 * spec.diameter_m)
-        case Crate() | Shelf() | Pallet() | Wall() | Beam() | RobotBody():
-            return rectangle(spec.length_m, spec.width_m)
-
-
-def heights(spec: BodySpec) -> tuple[float, float]:
-    """The lowest and the highest point of a body above the floor."""
-    on_top_m = 0.0
-    if isinstance(spec, Pallet):
-        on_top_m = spec.load_height_m
-    elif isinstance(spec, RobotBody):
-        on_top_m = max(spec.load_height_m, SENSOR_HEIGHT_M)
-    return spec.z_m, spec.z_m + spec.height_m + on_top_m
 
 
 def _padded(shape: FloatArray, corners: int) -> FloatArray:

@@ -15,6 +15,7 @@ from hal.types import FloatArray, PlanarPose, Pose
 from sim.models.bodies import BodyModel, build_body
 from sim.models.building import build_room
 from sim.models.mesh import Faces, join, normals
+from sim.models.outlines import footprint, heights
 from sim.motion import MotionState, Trajectory
 
 BUILDING_ID = 0
@@ -172,7 +173,7 @@ def _state(body: _Body, t_s: float) -> BodyState:
     state: MotionState = body.trajectory.at(t_s)
     c, s = math.cos(state.heading_rad), math.sin(state.heading_rad)
     turn = np.array([[c, -s], [s, c]])
-    outline = body.model.footprint(state)
+    outline = footprint(body.spec, state.speed_mps)
     return BodyState(
         id=body.id,
         name=body.spec.name,
@@ -182,6 +183,6 @@ def _state(body: _Body, t_s: float) -> BodyState:
         yaw_rate_radps=state.yaw_rate_radps,
         footprint_m=outline @ turn.T + np.array([state.x_m, state.y_m]),
         reach_m=math.sqrt(float((outline * outline).sum(axis=1).max())),
-        z_m=body.model.z_m,
+        z_m=heights(body.spec),
         moves=body.spec.motion is not None,
     )

@@ -1,8 +1,7 @@
-"""The model of each kind of body of a scenario: its faces, and the footprint that counts for contact."""
+"""The faces of each kind of body of a scenario. Its footprint and heights: outlines.py."""
 
 from __future__ import annotations
 
-import math
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -23,44 +22,27 @@ from config.scenario import (
     Texture,
     Wall,
 )
-from hal.types import FloatArray, Pose
+from hal.types import Pose
 from sim.models.mesh import Faces, box, join, prism
-from sim.models.person import build_person, person_footprint, pose_person
+from sim.models.outlines import POLE_SIDES
+from sim.models.person import build_person, pose_person
 from sim.models.rack import build_rack
-from sim.models.vehicle import SENSOR_HEIGHT_M, build_robot
+from sim.models.vehicle import build_robot
 from sim.motion import MotionState
 
 Articulation = Callable[[MotionState], tuple[Pose, ...]]
-Outline = Callable[[MotionState], FloatArray]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyModel:
-    """The model of one body. pose_parts and footprint depend on the state of motion.
+    """The faces of one body.
 
     parts: faces, each in the part's own frame.
-    z_m: lowest and highest point.
-    pose_parts: the pose of every part in the body frame.
-    footprint: the outline that counts for contact, a convex polygon (K, 2), counter-clockwise, in the body
-        frame.
+    pose_parts: the pose of every part in the body frame, in a state of motion.
     """
 
     parts: tuple[Faces, ...]
-    z_m: tuple[float, float]
     pose_parts: Articulation
-    footprint: Outline
-
-
-def rectangle(length_m: float, width_m: float) -> FloatArray:
-    """The corners (4, 2) of a rectangle around the origin, counter-clockwise, length along x."""
-    x, y = 0.5 * length_m, 0.5 * width_m
-    return np.array([[x, -y], [x, y], [-x, y], [-x, -y]])
-
-
-def regular_polygon(sides: int, radius_m: float) -> FloatArray:
-    """Corners (sides, 2) on a circle around the origin, counter-clockwise, as in sim.models.mesh.prism."""
-    angles = (np.arange(sides) + 0.5) * (2.0 * math.pi / sides)
-    return np.stack([radius_m * np.cos(angles), radius_m * np.sin(angles)], axis=1)
 
 
 def build_body(spec: BodySpec, seed: int) -> BodyModel:
@@ -68,54 +50,40 @@ def build_body(spec: BodySpec, seed: int) -> BodyModel:
     generator = np.random.default_rng((seed, zlib.crc32(spec.name.encode())))
     pick = int(generator.integers(6))
     match spec:
-        case Crate():
-            size = (spec.length_m, spec.width_m, spec.height_m)
-            faces = box(size, _crate_texture(spec.texture, pick), (0.0, 0.0, spec.z_m))
-            return _solid(faces, rectangle(spec.length_m, spec.width_m), spec.z_m, spec.height_m)
-        case Shelf():
-            size = (spec.length_m, spec.width_m, spec.height_m)
-            faces = build_rack(spec, generator)
-            return _solid(faces, rectangle(spec.length_m, spec.width_m), spec.z_m, spec.height_m)
-        case Column():
-            return _tube(spec, spec.sides, _column_texture(spec.texture))
-        case Pole():
-            return _tube(spec, 8, _pole_texture(spec.texture))
-        case Pallet():
-            height = spec.height_m + spec.load_height_m
-            return _solid(_pallet(spec, pick), rectangle(spec.length_m, spec.width_m), spec.z_m, height)
-        case Wall():
-            size = (spec.length_m, spec.width_m, spec.height_m)
-            faces = box(size, _wall_texture(spec.texture), (0.0, 0.0, spec.z_m))
-            return _solid(faces, rectangle(spec.length_m, spec.width_m), spec.z_m, spec.height_m)
-        case Beam():
-            size = (spec.length_m, spec.width_m, spec.height_m)
-            faces = box(size, _beam_texture(spec.texture), (0.0, 0.0, spec.z_m))
-            return _solid(faces, rectangle(spec.length_m, spec.width_m), spec.z_m, spec.height_m)
         case Person():
-            return BodyModel(
-                parts=build_person(spec, generator),
-                z_m=(spec.z_m, spec.z_m + spec.height_m),
-                pose_parts=partial(pose_person, spec),
-                footprint=partial(person_footprint, spec),
-            )
+            return BodyModel(build_person(spec, generator), partial(pose_person, spec))
         case RobotBody():
-            parts, articulation = build_robot(spec, pick)
-            top = spec.z_m + spec.height_m + max(spec.load_height_m, SENSOR_HEIGHT_M)
-            outline = rectangle(spec.length_m, spec.width_m)
-            return BodyModel(parts, (spec.z_m, top), articulation, lambda _: outline)
+            return BodyModel(*build_robot(spec, pick))
+        case Crate():
+            return _solid(_cuboid(spec, _crate_texture(spec.texture, pick)))
+        case Shelf():
+            return _solid(build_rack(spec, generator))
+        case Column():
+            return _solid(_tube(spec, spec.sides, _column_texture(spec.texture)))
+        case Pole():
+            return _solid(_tube(spec, POLE_SIDES, _pole_texture(spec.texture)))
+        case Pallet():
+            return _solid(_pallet(spec, pick))
+        case Wall():
+            return _solid(_cuboid(spec, _wall_texture(spec.texture)))
+        case Beam():
+            return _solid(_cuboid(spec, _beam_texture(spec.texture)))
 
 
-def _solid(faces: Faces, footprint_m: FloatArray, z_m: float, height_m: float) -> BodyModel:
+def _solid(faces: Faces) -> BodyModel:
+    """A body of one part, which does not move in the body frame."""
     still = (Pose(np.eye(3), np.zeros(3)),)
-    return BodyModel((faces,), (z_m, z_m + height_m), lambda _: still, lambda _: footprint_m)
+    return BodyModel((faces,), lambda _: still)
 
 
-def _tube(spec: Column | Pole, sides: int, texture: str) -> BodyModel:
+def _cuboid(spec: Crate | Wall | Beam, texture: str | dict[str, str]) -> Faces:
+    return box((spec.length_m, spec.width_m, spec.height_m), texture, (0.0, 0.0, spec.z_m))
+
+
+def _tube(spec: Column | Pole, sides: int, texture: str) -> Faces:
     radius = 0.5 * spec.diameter_m
-    z_m = (spec.z_m, spec.z_m + spec.height_m)
     cap = "plain/steel" if sides % 2 == 0 else None
-    faces = prism(sides, (radius, radius), z_m, texture, cap=cap)
-    return _solid(faces, regular_polygon(sides, radius), spec.z_m, spec.height_m)
+    return prism(sides, (radius, radius), (spec.z_m, spec.z_m + spec.height_m), texture, cap=cap)
 
 
 def _pallet(spec: Pallet, pick: int) -> Faces:

@@ -35,37 +35,25 @@ def build_person(spec: Person, generator: np.random.Generator) -> tuple[Faces, .
     return _trunk(h, clothes), *leg, *leg, upper_arm, forearm, upper_arm, forearm
 
 
-def person_footprint(spec: Person, state: MotionState) -> FloatArray:
-    """An octagon (8, 2) in the body frame around feet and arms, whose swing depends on the speed."""
-    h, swing = spec.height_m, _swing(state.speed_mps)
-    front, rear, side = (0.11 + 0.23 * swing) * h, (0.075 + 0.20 * swing) * h, 0.166 * h
-    return np.array(
-        [
-            [front, -0.11 * h], [front, 0.11 * h], [0.85 * front, side], [-0.85 * rear, side],
-            [-rear, 0.11 * h], [-rear, -0.11 * h], [-0.85 * rear, -side], [0.85 * front, -side],
-        ]
-    )  # fmt: skip
-
-
 def pose_person(spec: Person, state: MotionState) -> tuple[Pose, ...]:
     """The poses of the parts in the body frame. The lower foot stands on the floor."""
-    h, swing = spec.height_m, _swing(state.speed_mps)
+    h, amplitude = spec.height_m, swing(state.speed_mps)
     cycle = state.distance_m / (2.0 * _STEP_M * h)
     legs: list[Pose] = []
     arms: list[Pose] = []
     for side, offset in ((1.0, 0.0), (-1.0, 0.5)):
         hip = np.array([0.0, side * 0.052 * h, _HIP * h])
         reach, lift_ratio = _stride((cycle + offset) % 1.0)
-        knee_rad = _KNEE_BEND_RAD * swing * lift_ratio
+        knee_rad = _KNEE_BEND_RAD * amplitude * lift_ratio
         # Bending the knee would pull the foot back; the thigh compensates for that.
-        thigh_rad = -math.asin(swing * reach * _STEP_M / (_HIP - _ANKLE)) - 0.5 * knee_rad
+        thigh_rad = -math.asin(amplitude * reach * _STEP_M / (_HIP - _ANKLE)) - 0.5 * knee_rad
         legs.extend(_limb_poses(hip, thigh_rad, (_HIP - _KNEE) * h, knee_rad))
         ankle = legs[-1].apply(np.array([[0.0, 0.0, (_ANKLE - _KNEE) * h]]))[0]
         legs.append(Pose(axis_rotation("y", _FOOT_PITCH_RATIO * (thigh_rad + knee_rad)), ankle))
     for side, offset in ((1.0, 0.5), (-1.0, 0.0)):
         shoulder = np.array([0.0, side * 0.13 * h, (_SHOULDER - 0.01) * h])
-        arm_rad = -_ARM_SWING_RAD * swing * math.cos(2.0 * math.pi * (cycle + offset))
-        arms.extend(_limb_poses(shoulder, arm_rad, (_SHOULDER - _ELBOW) * h, -0.15 - 0.3 * swing))
+        arm_rad = -_ARM_SWING_RAD * amplitude * math.cos(2.0 * math.pi * (cycle + offset))
+        arms.extend(_limb_poses(shoulder, arm_rad, (_SHOULDER - _ELBOW) * h, -0.15 - 0.3 * amplitude))
     soles = np.concatenate([foot.apply(_SOLE * h)[:, 2] for foot in (legs[2], legs[5])])
     lift = np.array([0.0, 0.0, spec.z_m - float(soles.min())])
     poses = (Pose(np.eye(3), np.zeros(3)), *legs, *arms)
@@ -86,7 +74,7 @@ def _stride(cycle: float) -> tuple[float, float]:
     return forward, math.sin(math.pi * q) ** 2
 
 
-def _swing(speed_mps: float) -> float:
+def swing(speed_mps: float) -> float:
     """The amplitude of the swing of the limbs, 0..1: zero at rest, less when walking slowly."""
     return min(1.0, speed_mps / 0.5)
 
