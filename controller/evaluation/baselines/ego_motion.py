@@ -24,7 +24,7 @@ def seed_ransac() -> None:
 
 
 def corners(grey: Mask, count: int, existing: Points | None = None) -> Points:
-    """(N, 2) corners (good features to track), at most count; none near the points in taken."""
+    """(N, 2) corners (good features to track), at most count; none near the points in existing."""
     mask = None
     if existing is not None and len(existing):
         mask = np.full(grey.shape, 255, np.uint8)
