@@ -58,7 +58,7 @@ def prepare_folder(folder: Path) -> None:
 def write_figures(folder: Path, summary: Summary, records: Sequence[SequenceRecord]) -> None:
     """Write the diagrams, and Fig. 6. Raises UserError."""
     reporting = summary.splits["reporting"]
-    if OURS in reporting:
+    if summary.has_moving_objects:
         write_picture(folder / "fig4-precision-recall.png", figures.precision_recall(summary))
         write_picture(folder / "speed-error.png", figures.speed_error(reporting))
         write_picture(folder / "latency.png", figures.latency(reporting))

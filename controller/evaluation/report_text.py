@@ -121,8 +121,7 @@ def _table_one(methods: dict[str, MethodSummary]) -> list[str]:
 
 def _figures(summary: Summary, shown: bool) -> list[str]:
     lines = []
-    ours = OURS in summary.splits["reporting"]
-    if ours:
+    if summary.has_moving_objects:
         lines += section("Fig. 4: precision and recall", _FIG_FOUR)
         lines += picture("Precision and recall", "fig4-precision-recall.png")
     if any(summary.endpoint.count):
@@ -136,7 +135,7 @@ def _figures(summary: Summary, shown: bool) -> list[str]:
     if shown:
         lines += section("Fig. 6: scene, depth as a picture, result")
         lines += picture("Scene, depth, result", "fig6-scene-depth-result.png")
-    if ours:
+    if summary.has_moving_objects:
         lines += section("Velocity error, latency, distance", _SPEED)
         lines += picture("Velocity error", "speed-error.png") + picture("Latency", "latency.png")
         lines += picture("Found by distance", "found-by-distance.png")

@@ -70,6 +70,12 @@ class Summary:
     scores: dict[str, dict[str, SequenceScore]]
     split_of: dict[str, str]
 
+    @property
+    def has_moving_objects(self) -> bool:
+        """Whether the reporting split has any, for our detector: without them its diagrams are empty."""
+        ours = self.splits["reporting"].get(OURS)
+        return ours is not None and ours.figures.objects.correct + ours.figures.objects.missed > 0
+
 
 def summarise(records: Sequence[SequenceRecord]) -> Summary:
     """Score all records."""

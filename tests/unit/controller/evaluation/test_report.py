@@ -154,6 +154,17 @@ def test_the_report_has_its_sections_figures_and_json(
     assert json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["version"] == 1
 
 
+def test_without_moving_objects_there_are_no_empty_diagrams(
+    records: tuple[SequenceRecord, ...], tmp_path: Path
+) -> None:
+    still = records[1:]
+    summary = summarise(still)
+    write_figures(tmp_path, summary, still)
+    text = "\n".join(simulated_lines(summary, still, [], "treadwatch evaluate --sim"))
+    assert {file.name for file in tmp_path.iterdir()} == {"fig5-endpoint-error.png"}
+    assert text.count("![") == 1
+
+
 def test_preparing_removes_what_an_earlier_run_left_and_nothing_else(tmp_path: Path) -> None:
     prepare_folder(tmp_path)
     old = (
