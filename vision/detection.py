@@ -14,8 +14,6 @@ from vision.depth.depth_grid import DepthGrid
 from vision.motion.velocities import EndResiduals
 from vision.scene import CameraCondition, CameraHealth, EgoMotion
 
-# Without odometry, at least this share of the fragments must fit one motion of the camera.
-MIN_AGREEMENT = 0.45
 # The ego-motion of a frame that was not compared with the one before.
 MOTION_NOT_KNOWN = EgoMotion(
     motion=Pose(np.eye(3), np.zeros(3)),

@@ -22,8 +22,8 @@ from vision.camera.lens import vector_from_rotation
 from vision.camera.mount_check import MountCheck
 from vision.depth.depth_grid import DepthGrid, make_grid
 from vision.depth.depth_mask import surface_depth
-from vision.detection import MIN_AGREEMENT, MOTION_NOT_KNOWN, Detection, camera_health, no_motion
-from vision.ego_motion.camera_motion import CameraEstimate, estimate
+from vision.detection import MOTION_NOT_KNOWN, Detection, camera_health, no_motion
+from vision.ego_motion.camera_motion import MIN_AGREEMENT, CameraEstimate, estimate
 from vision.ego_motion.motion_memory import MotionMemory
 from vision.ego_motion.motion_prior import MotionPrior
 from vision.ego_motion.rolling_shutter import ReadOut
@@ -131,7 +131,7 @@ class Detector:
             motion,
             ego,
             dt_s=dt_s,
-            motion_known=ego.source in ("visual", "odometry") and not blurred,
+            motion_known=ego.source in ("visual", "odometry") and (found.noisy or not blurred),
             reckoned=reckoned,
         )
         # A look at a body takes the place of a renewal, but never twice in a row.
@@ -189,9 +189,13 @@ class Detector:
     ) -> EndResiduals:
         """Residuals of all ends; updates the scale of the noise, and the running averages of depth."""
         store, noise, scale = self._store, self._config.depth_noise, self._variance_scale
+        if found.noisy:
+            scale = max(scale, found.noise_scale)
         motion = residuals(store, anchor, depths, found, frame.intrinsics, noise, scale)
         if found.visual:
-            self._variance_scale = observed_variance_scale(motion, store.age_frames, excluded, scale)
+            self._variance_scale = observed_variance_scale(
+                motion, store.age_frames, excluded, scale, self._variance_scale
+            )
         average_depth(store, store.last_entries(frame.captured_ns), found.pose, noise)
         return motion
 

@@ -20,11 +20,15 @@ Conflict with a trusted prior (from odometry, or from the kinematics of a tracke
   as disputed: the robot's tracks may slip, or everything in view may move.
 * Otherwise the fit is repeated with a tighter prior. If the result still contradicts it, or too few points
   agree, the prior alone is the answer.
+
+Without odometry, a frame in which few points fit is tried again with the pixel noise that its own points show
+(_noise_scale). A hand-held camera that turns fast blurs some images, and depth and colour are not exposed at
+the same time. The points still tell the motion then, but with twice the assumed error.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -32,8 +36,11 @@ import numpy as np
 from hal.types import FloatArray, Intrinsics, Pose
 from vision.ego_motion.motion_prior import MotionPrior, SweepPrior
 from vision.ego_motion.reprojection import Anchors, View, view_of
-from vision.ego_motion.robust_fit import Fit, fit
+from vision.ego_motion.robust_fit import Fit, fit, misfits
+from vision.numerics.order import quantile
 
+# Without odometry, at least this share of the fragments must fit one motion of the camera.
+MIN_AGREEMENT = 0.45
 _MIN_POINTS = 8  # with two equations each: twice as many as unknowns
 _MIN_INLIER_RATIO = 0.25  # with fewer inliers, something other than the static world may have been followed
 _MIN_BACKGROUND_RATIO = 0.10  # the same with a tightened prior: the ground that agrees may be a small rest
@@ -43,6 +50,10 @@ _YAW_AND_TRANSLATION = np.array([1, 3, 4, 5])  # the unknowns that are compared 
 _CONFLICT_CHI2 = 13.3  # 99 %, 4 degrees of freedom
 _TRUSTED_SHARE = np.array([1.0, 0.3, 1.0, 0.2, 0.2, 0.2, 1.0, 1.0])  # of the prior's sigma, tightened
 _BENT_CHI2 = 16.0  # four sigmas: the image alone shows another sweep than the fit
+# Noise of the points in one frame: from the lower third, since static points are at least that many. A third
+# of chi-square with 2 degrees of freedom lies below the first value. Sigmas of more than twice the assumed
+# ones are not noise: something is wrong, such as depth that does not lie where the colour is.
+_CHI2_THIRD, _MAX_NOISE_SCALE = 0.811, 4.0
 _STRAIGHTENED_SHARE = 0.05  # of the points: minimum of additional inliers to accept the larger sweep
 
 
@@ -55,9 +66,10 @@ class CameraEstimate:
     bend_rad, bend_variance: the sweep as measured by the image alone, without a prior, (2,); the variance is
         inf where it tells nothing.
     covariance: of a small motion of the camera and of sweep_rad, (8, 8).
-    inlier_ratio: share of the usable points that agree; NaN where not estimated.
+    inlier_ratio: share of the usable points that agree under the assumed noise; NaN where not estimated.
     visual: the pose is estimated from the images; False: it is the prior, or disputed.
     disputed: nearly all points contradict the prior. The pose is theirs; neither of the two can be relied on.
+    noise_scale: variance of the pixels with which the motion is estimated, as a ratio to the assumed one.
     """
 
     pose: Pose
@@ -68,6 +80,12 @@ class CameraEstimate:
     inlier_ratio: float
     visual: bool
     disputed: bool = False
+    noise_scale: float = 1.0
+
+    @property
+    def noisy(self) -> bool:
+        """Whether only more noise than assumed explains the points."""
+        return self.noise_scale > 1.0
 
 
 def estimate(
@@ -86,24 +104,51 @@ def estimate(
     if len(use) < _MIN_POINTS:
         return _prior_only(start, np.concatenate((prior.sigma, sweep.sigma_rad)), float("nan"))
     view = view_of(anchors, pixels, use, camera)
-    found, sigma, bend = _fit_with_sweep(view, start, prior, sweep)
-    least = max(_MIN_POINTS, _MIN_INLIER_RATIO * len(use))
+    first, sigma, bend = _fit_with_sweep(view, start, prior, sweep)
+    found = _checked(view, start, prior, first, sigma, bend)
+    if prior.source != "none" or found.disputed or found.inlier_ratio >= MIN_AGREEMENT:
+        return found
+    scale = _noise_scale(view, first)
+    noisier = view.with_pixel_variance(scale)
+    again = _checked(noisier, start, prior, *_fit_with_sweep(noisier, start, prior, sweep))
+    if again.visual and again.inlier_ratio >= MIN_AGREEMENT:
+        return replace(again, inlier_ratio=found.inlier_ratio, noise_scale=scale)
+    return found
+
+
+def _noise_scale(view: View, found: Fit) -> float:
+    """Variance of the pixels in this frame, as a ratio to the assumed one, from 1 to _MAX_NOISE_SCALE."""
+    third = quantile(misfits(view, found), 1.0 / 3.0) / _CHI2_THIRD
+    return min(max(third, 1.0), _MAX_NOISE_SCALE)
+
+
+def _checked(
+    view: View,
+    start: Pose,
+    prior: MotionPrior,
+    found: Fit,
+    sigma: FloatArray,
+    bend: tuple[FloatArray, FloatArray],
+) -> CameraEstimate:
+    """The estimate from a fit and the sigma of its prior, if it does not contradict a trusted prior."""
+    points = len(view.seen)
+    least = max(_MIN_POINTS, _MIN_INLIER_RATIO * points)
     conflicts = prior.trusted and _conflict(found, prior.sigma)
     disputed = False
     if conflicts:
         # If the prior is far off, its gate excludes the points that contradict it. Fit with a wide one.
         freely = fit(view, start, sigma * _LOOSE_SHARE)
-        disputed = freely.inliers >= _UNANIMOUS_RATIO * len(use)
+        disputed = freely.inliers >= _UNANIMOUS_RATIO * points
         if disputed:
             found = freely
         else:
             # The fit has followed something large that moves. The ground is what agrees with the prior.
             found = fit(view, start, sigma * _TRUSTED_SHARE)
-            least = max(_MIN_POINTS, _MIN_BACKGROUND_RATIO * len(use))
+            least = max(_MIN_POINTS, _MIN_BACKGROUND_RATIO * points)
             # If it is still far from the prior, too little of the ground is in view to correct the prior.
             conflicts = _conflict(found, prior.sigma)
         bend = _bend(found)
-    ratio = found.inliers / len(use)
+    ratio = found.inliers / points
     # Without an inverse OpenCV returns zeros, which would mean perfect knowledge: check regular below.
     regular, covariance = cv2.invert(found.information, flags=cv2.DECOMP_CHOLESKY)
     if found.inliers < least or (conflicts and not disputed) or not regular:

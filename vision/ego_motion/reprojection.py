@@ -45,6 +45,12 @@ class View:
     seen: FloatArray
     whitening: FloatArray
 
+    def with_pixel_variance(self, scale: float) -> View:
+        """The same points, with scale times the variance of where they are seen."""
+        whitening = self.whitening.copy()
+        whitening[:, :3] /= math.sqrt(scale)
+        return View(self.lines, self.seen, whitening)
+
 
 def view_of(anchors: Anchors, pixels: FloatArray, use: NDArray[np.intp], camera: Intrinsics) -> View:
     """The View of the points use (M,), as indices. pixels (N, 2): where the points are seen now."""

@@ -73,6 +73,13 @@ def fit(view: View, start: Pose, sigma: FloatArray) -> Fit:
     )
 
 
+def misfits(view: View, found: Fit) -> FloatArray:
+    """(N,) chi-square of each point at the pose and sweep of a fit; inf if it is behind the camera."""
+    pose = np.empty((3, 4))
+    pose[:, :3], pose[:, 3] = found.pose.rotation, found.pose.translation_m
+    return _misfits(view.lines, view.seen, view.whitening, pose, found.sweep_rad)
+
+
 @inlined
 def _shifted(lines: FloatArray, seen: FloatArray, start: FloatArray, sigma: FloatArray) -> FloatArray:
     """A better start pose: start rotated by the median residual of all points, by 3 sigma (8,) at most."""
@@ -250,3 +257,16 @@ def _fitted(
         inliers += allowed[k] and chi2[k] <= _GATE_CHI2
     sweep_rad = sweep_rad + since_linearised[_SWEEP:]
     return pose, sweep_rad, back_to(pose, start), information, inliers, free, free_side, free_from_rad
+
+
+@compiled("float64[:, :, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1]")
+def _misfits(
+    lines: FloatArray, seen: FloatArray, whitening: FloatArray, pose: FloatArray, sweep_rad: FloatArray
+) -> FloatArray:
+    """As misfits()."""
+    table, by_depth, depth_downweight, in_front = _linearised(lines, seen, whitening, pose, sweep_rad)
+    chi2 = np.full(len(seen), np.inf)
+    for k in range(len(seen)):
+        if in_front[k]:
+            chi2[k] = _chi2(table[k], by_depth[k], depth_downweight[k])
+    return chi2

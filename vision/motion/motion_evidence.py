@@ -14,7 +14,8 @@ from hal.types import Flags, FloatArray, Integers, Matrices, Matrix, Vector
 from vision.bodies import sightings
 from vision.bodies.tracks import Tracks
 from vision.depth.depth_noise import depth_sigma_m
-from vision.detection import MIN_AGREEMENT, Detection
+from vision.detection import Detection
+from vision.ego_motion.camera_motion import MIN_AGREEMENT
 from vision.motion.least_squares import BodyVelocities
 from vision.motion.limbs import believable, restless
 

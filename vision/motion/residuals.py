@@ -83,19 +83,23 @@ def residuals(
 
 
 def observed_variance_scale(
-    motion: EndResiduals, age_frames: NDArray[np.intp], moving: NDArray[np.bool_], before: float
+    motion: EndResiduals,
+    age_frames: NDArray[np.intp],
+    moving: NDArray[np.bool_],
+    used: float,
+    before: float,
 ) -> float:
     """The variance scale for the next frame, from the scatter of static ends in this one.
 
     It covers errors that are not modelled, such as blur, a rolling shutter, or depth not aligned with colour.
     The lower third of the ends decides, so that movers which are not yet known do not count. moving (N,):
-    fragments known to move. before: the scale used in this frame.
+    fragments known to move. used: the scale used for motion. before: the one from earlier frames.
     """
     settled = motion.usable & ((age_frames >= _SETTLED_FRAMES) & ~moving).repeat(2)
     chi2 = motion.static_chi2[settled]
     if len(chi2) < _MIN_ENDS:
         return before
-    seen = before * quantile(chi2, 1.0 / 3.0) / _CHI2_THIRD
+    seen = used * quantile(chi2, 1.0 / 3.0) / _CHI2_THIRD
     return min(max(before + _SCALE_GAIN * (seen - before), _MIN_SCALE), _MAX_SCALE)
 
 

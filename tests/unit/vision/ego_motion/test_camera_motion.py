@@ -218,3 +218,41 @@ def test_points_behind_the_camera_have_no_say() -> None:
     assert metres < 1e-3
     assert radians < 2e-4
     assert found.inlier_ratio == pytest.approx(0.7, abs=0.02)
+
+
+@pytest.mark.parametrize(("noise_px", "agree"), [(0.1, 0.9), (0.5, 0.0)])
+def test_without_odometry_a_blurred_frame_is_fitted_with_its_own_noise(noise_px: float, agree: float) -> None:
+    """The assumed sigma is 0.14 px."""
+    static = anchors()
+    found = estimate(
+        static, seen(static.points_m, noise_px=noise_px), IDENTITY, nothing_known(), GLOBAL_SHUTTER, CAMERA
+    )
+    metres, radians = off(found)
+    assert found.visual
+    assert metres < 5e-3
+    assert radians < 1e-3
+    assert found.inlier_ratio >= agree
+
+
+def test_the_noise_of_a_blurred_frame_is_measured_and_the_agreement_is_that_under_the_assumed_noise() -> None:
+    """The assumed sigma is 0.14 px; more than twice of it is not assumed."""
+    exact = replace(anchors(), depth_sigma_m=np.full(160, 1e-4))
+    sharp, blurred, torn = (
+        estimate(exact, seen(exact.points_m, noise_px=px), IDENTITY, nothing_known(), GLOBAL_SHUTTER, CAMERA)
+        for px in (0.14, 0.5, 3.0)
+    )
+    assert not sharp.noisy
+    assert blurred.noisy
+    assert blurred.noise_scale == 4.0
+    assert blurred.inlier_ratio < 0.45
+    assert not torn.noisy
+    assert torn.inlier_ratio < 0.45
+
+
+def test_points_that_move_are_no_noise() -> None:
+    """Where most of the view moves, the rest is not declared to be static by assuming more noise."""
+    static = anchors()
+    away = np.linspace(0.01, 0.08, 160)[:, None] * [1.0, 0.0, 0.0]
+    now = static.points_m + np.where(share(160, 0.65)[:, None], away, 0.0)
+    found = estimate(static, seen(now, noise_px=0.1), IDENTITY, nothing_known(), GLOBAL_SHUTTER, CAMERA)
+    assert not found.noisy

@@ -202,23 +202,28 @@ def test_the_scatter_of_static_ends_is_learned_slowly_from_their_lower_third() -
     old, nobody = np.full(20, 5), np.zeros(20, np.bool_)
     chi2 = np.sort(np.random.default_rng(2).chisquare(2, 40))
     third = float(np.quantile(chi2, 1.0 / 3.0))
-    learned = observed_variance_scale(some(chi2), old, nobody, 1.0)
+    learned = observed_variance_scale(some(chi2), old, nobody, 1.0, 1.0)
     assert learned == pytest.approx(1.0 + 0.15 * (third / 0.811 - 1.0))
     # Half of the view moves: the lower third does not care.
     chi2[20:] += 500.0
-    assert observed_variance_scale(some(chi2), old, nobody, 1.0) == pytest.approx(learned)
+    assert observed_variance_scale(some(chi2), old, nobody, 1.0, 1.0) == pytest.approx(learned)
     # Twice the deviation everywhere.
-    assert observed_variance_scale(some(4.0 * np.full(40, 0.811)), old, nobody, 1.0) == pytest.approx(1.45)
+    twice = some(4.0 * np.full(40, 0.811))
+    assert observed_variance_scale(twice, old, nobody, 1.0, 1.0) == pytest.approx(1.45)
+    # The same scatter, measured in a frame that was taken for noisy.
+    as_assumed = some(np.full(40, 0.811))
+    assert observed_variance_scale(as_assumed, old, nobody, 4.0, 1.0) == pytest.approx(1.45)
 
 
 def test_the_scatter_has_bounds_and_needs_enough_settled_ends() -> None:
     old, nobody = np.full(20, 5), np.zeros(20, np.bool_)
     wild = some(np.full(40, 1e6))
-    assert observed_variance_scale(wild, old, nobody, 1.0) == 8.0
-    assert observed_variance_scale(some(np.zeros(40)), old, nobody, 0.31) == 0.3
-    assert observed_variance_scale(wild, np.full(20, 2), nobody, 1.0) == 1.0
-    assert observed_variance_scale(wild, old, ~nobody, 1.0) == 1.0
-    assert observed_variance_scale(some(np.full(40, 1e6), usable=False), old, nobody, 1.0) == 1.0
+    unusable = some(np.full(40, 1e6), usable=False)
+    assert observed_variance_scale(wild, old, nobody, 1.0, 1.0) == 8.0
+    assert observed_variance_scale(some(np.zeros(40)), old, nobody, 0.31, 0.31) == 0.3
+    assert observed_variance_scale(wild, np.full(20, 2), nobody, 1.0, 1.0) == 1.0
+    assert observed_variance_scale(wild, old, ~nobody, 1.0, 1.0) == 1.0
+    assert observed_variance_scale(unusable, old, nobody, 1.0, 1.0) == 1.0
 
 
 @pytest.mark.parametrize(
