@@ -1,0 +1,177 @@
+"""Speed across the line of sight of bodies by their free rims (vision/depth/rims.py).
+
+The centre of a half hidden body tells no velocity: it moves as the body comes out from behind what hides it.
+A free rim is part of the body's own outline and moves with the body. Each row of a rim is compared with the
+rim of the same body a moment ago, at the same height, with the camera's own motion taken out. The median over
+the rows is the displacement, so that limbs and other changes of the outline in a few rows do not count.
+
+vision/tracker.py calls it after the centres have been measured (vision/bodies/sightings.py).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hal.compiled import compiled
+from hal.types import Flags, FloatArray, Integers, Matrix, Pose, Vector
+from vision.bodies.tracks import Tracks
+from vision.depth.connected import IntGrid
+from vision.depth.depth_grid import DepthGrid
+from vision.depth.rims import NO_RIM, FreeRims, free_rims
+from vision.numerics import kalman
+from vision.numerics.relative_pose import NEAREST_M, coordinate_m, relative_row
+
+# Rims are compared over this time: a walking person moves by 0.2 m, five times the width of a cell 6 m away,
+# and less than a step long, so that a leg does not change its side.
+_LOOK_BACK_S = 0.2
+_SHORTEST_S = 0.1  # for tracks that are younger; in less time the width of a cell is as much as a slow walk
+_MIN_ROWS = 8  # fewer are a hand, or the corner of something
+_ROWS_ALIKE = 5.0  # rows that share their noise: a cell is a median over 5x5 cells
+_MEDIAN = 1.2533 * 1.4826  # sigma of a median of one value, in median absolute deviations
+_QUANTUM = 0.29  # cells, sigma of a uniform distribution over one: all rows of an upright edge share it
+_FLOOR_SIGMA_MPS = 0.03  # added sigma: error of the camera's own motion, as in vision/motion/line_of_sight.py
+_UNKNOWN_MPS = 100.0  # sigma in the directions that a rim does not measure
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RimVelocities:
+    """Velocities of T tracks by their free rims, in the fixed frame.
+
+    mps: component along direction, (T,).
+    sigma_mps: its standard deviation, (T,); inf where there are not enough rows of free rims now and then.
+    direction: level unit vector across the line of sight, (T, 3).
+    lag_s: time over which they are measured, (T,).
+    """
+
+    mps: Vector
+    sigma_mps: Vector
+    direction: Matrix
+    lag_s: Vector
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Memory:
+    stamp_ns: int
+    track_id: NDArray[np.int64]
+    rims: FreeRims
+    pose: Pose
+
+
+class RimMemory:
+    """Remembers the free rims of the tracks over the last moments."""
+
+    def __init__(self) -> None:
+        self._memories: list[_Memory] = []
+
+    def clear(self) -> None:
+        """Forget all rims: the poses of their views cannot be compared with those to come."""
+        self._memories.clear()
+
+    def velocities(
+        self, grid: DepthGrid, labels: IntGrid, tracks: Tracks, pose: Pose, now_ns: int
+    ) -> RimVelocities:
+        """Measure the tracks with the cells labels (h, w), track index + 1, and remember their rims."""
+        rims = free_rims(grid, labels, len(tracks))
+        mps, sigma_mps = np.zeros(len(tracks)), np.full(len(tracks), np.inf)
+        direction, lag_s = np.zeros((len(tracks), 3)), np.full(len(tracks), _LOOK_BACK_S)
+        for memory in self._looked_back_at(now_ns):
+            index = tracks.index_of(memory.track_id)
+            since_s = (now_ns - memory.stamp_ns) * 1e-9
+            found = _measured(grid, rims, pose, memory.rims, memory.pose, index, since_s)
+            new = np.isinf(sigma_mps) & np.isfinite(found[1])
+            mps, sigma_mps = np.where(new, found[0], mps), np.where(new, found[1], sigma_mps)
+            direction = np.where(new[:, None], found[2] @ pose.rotation.T, direction)
+            lag_s = np.where(new, since_s, lag_s)
+        self._memories.append(_Memory(now_ns, tracks.ids, rims, pose))
+        return RimVelocities(mps, sigma_mps, direction, lag_s)
+
+    def _looked_back_at(self, now_ns: int) -> list[_Memory]:
+        """The oldest view of the last _LOOK_BACK_S, and the one that serves younger tracks."""
+        self._memories = [m for m in self._memories if (now_ns - m.stamp_ns) * 1e-9 < _LOOK_BACK_S + 0.02]
+        old = [m for m in self._memories if (now_ns - m.stamp_ns) * 1e-9 > _SHORTEST_S - 0.02]
+        return old[:1] + old[1:][-1:]
+
+
+@compiled(DepthGrid, FreeRims, Pose, FreeRims, Pose, "int64[::1], float64")
+def _measured(
+    grid: DepthGrid, now: FreeRims, pose: Pose, then: FreeRims, old_pose: Pose, track: Integers, lag_s: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """mps, sigma_mps (inf where not measured) and direction, in the camera axes, of RimVelocities.
+
+    track: present index of each of the tracks of then, -1 if it has ended. pose: of the camera now; old_pose:
+    lag_s ago.
+    """
+    count, rows = len(now.column), now.column.shape[2]
+    mps, sigma_mps, direction = np.zeros(count), np.full(count, np.inf), np.zeros((count, 3))
+    shift_m, found = np.empty(2 * rows), 0
+    to_x, to_y = relative_row(pose, old_pose, 0), relative_row(pose, old_pose, 1)
+    to_z = relative_row(pose, old_pose, 2)
+    step = grid.x[1] - grid.x[0]
+    for k in range(len(track)):
+        t = track[k]
+        if t < 0:
+            continue
+        found, ray_x, depth_m = 0, 0.0, 0.0
+        for side in range(2):
+            if then.inverse[k, side] == 0.0 or now.inverse[t, side] == 0.0:
+                continue
+            old_m = np.float32(1.0 / then.inverse[k, side])
+            for i in range(rows):
+                rim = then.column[k, side, i]
+                if rim == NO_RIM:
+                    continue
+                x, y = grid.x[rim] * old_m, grid.y[i] * old_m
+                z = coordinate_m(to_z, x, y, old_m)
+                if z < NEAREST_M:
+                    continue
+                row = int(math.floor((coordinate_m(to_y, x, y, old_m) / z - grid.y[0]) / step + 0.5))
+                if not 0 <= row < rows or now.column[t, side, row] == NO_RIM:
+                    continue
+                here_x = grid.x[now.column[t, side, row]]
+                shift_m[found] = here_x * z - coordinate_m(to_x, x, y, old_m)
+                ray_x, depth_m, found = ray_x + here_x, depth_m + z, found + 1
+        if found < _MIN_ROWS:
+            continue
+        ray_x, depth_m = ray_x / found, depth_m / found
+        middle_m = np.median(shift_m[:found])
+        spread_m = _MEDIAN * np.median(np.abs(shift_m[:found] - middle_m))
+        variance = 2.0 * (_QUANTUM * step * depth_m) ** 2 + spread_m * spread_m * _ROWS_ALIKE / found
+        across = 1.0 / math.sqrt(1.0 + ray_x * ray_x)
+        mps[t], sigma_mps[t] = across * middle_m / lag_s, across * math.sqrt(variance) / lag_s
+        direction[t, 0], direction[t, 2] = across, -across * ray_x
+    return mps, sigma_mps, direction
+
+
+def one_way_s(so_far_s: FloatArray, rims: RimVelocities, sigmas: float, dt_s: float) -> FloatArray:
+    """(T,) for how long rims have shown motion in one direction, negative to the left, after a further frame."""
+    clear = np.abs(rims.mps) > sigmas * np.hypot(rims.sigma_mps, _FLOOR_SIGMA_MPS)
+    way = np.sign(rims.mps)
+    before_s = np.where(np.sign(so_far_s) == way, so_far_s, 0.0)
+    return np.where(clear, before_s + way * dt_s, 0.0)
+
+
+def fuse(tracks: Tracks, rims: RimVelocities, chosen: Flags, dt_s: float) -> None:
+    """Update both filters of the chosen (T,) tracks with their velocities by rims, dt_s after the frame before."""
+    use = (chosen & np.isfinite(rims.sigma_mps)).nonzero()[0]
+    if len(use) == 0:
+        return
+    direction = rims.direction[use]
+    # The time windows of successive frames overlap: a frame adds dt / window of a new measurement.
+    variance = rims.sigma_mps[use] ** 2 * rims.lag_s[use] / dt_s
+    along = direction[:, :, None] * direction[:, None, :]
+    noise = _UNKNOWN_MPS**2 * (np.eye(3) - along) + variance[:, None, None] * along
+    velocity = rims.mps[use, None] * direction
+    tracks.state[use], tracks.covariance[use] = kalman.update(
+        tracks.state.take(use, axis=0), tracks.covariance.take(use, axis=0), velocity, noise, 3
+    )
+    tracks.surface_state[use], tracks.surface_covariance[use] = kalman.update(
+        tracks.surface_state.take(use, axis=0),
+        tracks.surface_covariance.take(use, axis=0),
+        velocity,
+        noise,
+        3,
+    )
