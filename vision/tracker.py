@@ -61,7 +61,7 @@ class Tracker:
         self._tracks = Tracks()
         self._free = ViewMemory(config.depth_noise)
         self._near_floor = NearFloor(config.min_depth_m)
-        self._rims = rim_motion.RimMemory()
+        self._rims = rim_motion.RimMemory(IMPLAUSIBLE_SPEED_FACTOR * config.motion.max_speed_mps)
         self._surfaces = masks.NO_TRACK_SURFACES
         self._fragment_ids = np.empty(0, np.int64)
         self._fragment_owner = np.empty(0, np.int64)
@@ -107,12 +107,12 @@ class Tracker:
         if detection.motion_known or detection.restarted:
             self._free.remember(grid, pose, detection.captured_ns)
         labels, whole, measured = self._label(detection, above_floor, changes, velocities, elapsed_s)
-        centred = sightings.update_from_surfaces(
+        sightings.update_from_surfaces(
             tracks, detection, occlusion.with_occlusion(grid, labels, measured), self._config.depth_noise
         )
         rims = self._rims.velocities(grid, labels, tracks, pose, detection.captured_ns)
         if detection.dt_s > 0:
-            rim_motion.fuse(tracks, rims, ~centred, detection.dt_s)
+            rim_motion.fuse(tracks, rims, detection.dt_s)
         max_mps = self._config.motion.max_speed_mps
         sightings.forget_implausible(tracks, IMPLAUSIBLE_SPEED_FACTOR * max_mps, max_mps)
         if tracks.overhead.any():

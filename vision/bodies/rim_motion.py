@@ -16,14 +16,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hal.compiled import compiled
-from hal.types import Flags, FloatArray, Integers, Matrix, Pose, Vector
+from hal.compiled import compiled, inlined
+from hal.types import FloatArray, Integers, Matrix, Pose, Vector
 from vision.bodies.tracks import Tracks
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import DepthGrid
 from vision.depth.rims import NO_RIM, FreeRims, free_rims
 from vision.numerics import kalman
-from vision.numerics.relative_pose import NEAREST_M, coordinate_m, relative_row
+from vision.numerics.relative_pose import NEAREST_M, Row, coordinate_m, relative_row
 
 # Rims are compared over this time: a walking person moves by 0.2 m, five times the width of a cell 6 m away,
 # and less than a step long, so that a leg does not change its side.
@@ -64,7 +64,8 @@ class _Memory:
 class RimMemory:
     """Remembers the free rims of the tracks over the last moments."""
 
-    def __init__(self) -> None:
+    def __init__(self, fastest_mps: float) -> None:
+        self._fastest_mps = fastest_mps  # no body is faster
         self._memories: list[_Memory] = []
 
     def clear(self) -> None:
@@ -74,14 +75,17 @@ class RimMemory:
     def velocities(
         self, grid: DepthGrid, labels: IntGrid, tracks: Tracks, pose: Pose, now_ns: int
     ) -> RimVelocities:
-        """Measure the tracks with the cells labels (h, w), track index + 1, and remember their rims."""
+        """Measure the tracks with the cells labels (h, w), track index + 1, and remember their rims.
+
+        Call clear first where pose cannot be compared with those before.
+        """
         rims = free_rims(grid, labels, len(tracks))
         mps, sigma_mps = np.zeros(len(tracks)), np.full(len(tracks), np.inf)
         direction, lag_s = np.zeros((len(tracks), 3)), np.full(len(tracks), _LOOK_BACK_S)
         for memory in self._looked_back_at(now_ns):
             index = tracks.index_of(memory.track_id)
             since_s = (now_ns - memory.stamp_ns) * 1e-9
-            found = _measured(grid, rims, pose, memory.rims, memory.pose, index, since_s)
+            found = _measured(grid, rims, pose, memory.rims, memory.pose, index, since_s, self._fastest_mps)
             new = np.isinf(sigma_mps) & np.isfinite(found[1])
             mps, sigma_mps = np.where(new, found[0], mps), np.where(new, found[1], sigma_mps)
             direction = np.where(new[:, None], found[2] @ pose.rotation.T, direction)
@@ -96,67 +100,103 @@ class RimMemory:
         return old[:1] + old[1:][-1:]
 
 
-@compiled(DepthGrid, FreeRims, Pose, FreeRims, Pose, "int64[::1], float64")
-def _measured(
-    grid: DepthGrid, now: FreeRims, pose: Pose, then: FreeRims, old_pose: Pose, track: Integers, lag_s: float
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """mps, sigma_mps (inf where not measured) and direction, in the camera axes, of RimVelocities.
+@inlined
+def _add_shifts(
+    grid: DepthGrid,
+    column: NDArray[np.int32],
+    old_column: NDArray[np.int32],
+    old_depth_m: np.float32,
+    rows: tuple[Row, Row, Row],
+    farthest_m: float,
+    shift_m: FloatArray,
+    sums: FloatArray,
+) -> None:
+    """Compare one rim, column (h,), with the same rim of another view, old_column (h,), row by row.
 
-    track: present index of each of the tracks of then, -1 if it has ended. pose: of the camera now; old_pose:
-    lag_s ago.
+    rows: of the transform from the old axes of the camera to its present ones. Adds the displacements along x
+    to shift_m, and to sums their number, the ray x and the depth of the rim. Displacements of more than
+    farthest_m are left out: there other cells have joined the body or left it.
     """
-    count, rows = len(now.column), now.column.shape[2]
+    to_x, to_y, to_z = rows
+    height, step = len(column), grid.y[1] - grid.y[0]
+    for i in range(height):
+        if old_column[i] == NO_RIM:
+            continue
+        x_m, y_m = grid.x[old_column[i]] * old_depth_m, grid.y[i] * old_depth_m
+        depth_m = coordinate_m(to_z, x_m, y_m, old_depth_m)
+        if depth_m < NEAREST_M:
+            continue
+        y = coordinate_m(to_y, x_m, y_m, old_depth_m) / depth_m
+        row = math.floor((y - grid.y[0]) / step + np.float32(0.5))
+        if row < 0 or row >= height or column[row] == NO_RIM:
+            continue
+        x = grid.x[column[row]]
+        displacement_m = x * depth_m - coordinate_m(to_x, x_m, y_m, old_depth_m)
+        if abs(displacement_m) > farthest_m:
+            continue
+        shift_m[int(sums[0])] = displacement_m
+        sums[0] += 1.0
+        sums[1] += x
+        sums[2] += depth_m
+
+
+@compiled(DepthGrid, FreeRims, Pose, FreeRims, Pose, "int64[::1], float64, float64")
+def _measured(
+    grid: DepthGrid,
+    now: FreeRims,
+    pose: Pose,
+    then: FreeRims,
+    old_pose: Pose,
+    track: Integers,
+    lag_s: float,
+    fastest_mps: float,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """mps, sigma_mps and direction of RimVelocities, the latter along the camera axes.
+
+    pose: of the camera now; old_pose: lag_s ago. track: present index of each track of then, -1 if it has
+    ended.
+    """
+    count, height = len(now.column), now.column.shape[2]
     mps, sigma_mps, direction = np.zeros(count), np.full(count, np.inf), np.zeros((count, 3))
-    shift_m, found = np.empty(2 * rows), 0
-    to_x, to_y = relative_row(pose, old_pose, 0), relative_row(pose, old_pose, 1)
-    to_z = relative_row(pose, old_pose, 2)
-    step = grid.x[1] - grid.x[0]
+    rows = relative_row(pose, old_pose, 0), relative_row(pose, old_pose, 1), relative_row(pose, old_pose, 2)
+    shift_m, step = np.empty(2 * height), grid.x[1] - grid.x[0]
     for k in range(len(track)):
         t = track[k]
         if t < 0:
             continue
-        found, ray_x, depth_m = 0, 0.0, 0.0
+        sums = np.zeros(3)
         for side in range(2):
-            if then.inverse[k, side] == 0.0 or now.inverse[t, side] == 0.0:
-                continue
-            old_m = np.float32(1.0 / then.inverse[k, side])
-            for i in range(rows):
-                rim = then.column[k, side, i]
-                if rim == NO_RIM:
-                    continue
-                x, y = grid.x[rim] * old_m, grid.y[i] * old_m
-                z = coordinate_m(to_z, x, y, old_m)
-                if z < NEAREST_M:
-                    continue
-                row = int(math.floor((coordinate_m(to_y, x, y, old_m) / z - grid.y[0]) / step + 0.5))
-                if not 0 <= row < rows or now.column[t, side, row] == NO_RIM:
-                    continue
-                here_x = grid.x[now.column[t, side, row]]
-                shift_m[found] = here_x * z - coordinate_m(to_x, x, y, old_m)
-                ray_x, depth_m, found = ray_x + here_x, depth_m + z, found + 1
+            if then.inverse[k, side] > 0.0 and now.inverse[t, side] > 0.0:
+                old_depth_m = np.float32(1.0 / then.inverse[k, side])
+                column, old_column = now.column[t, side], then.column[k, side]
+                _add_shifts(grid, column, old_column, old_depth_m, rows, fastest_mps * lag_s, shift_m, sums)
+        found = int(sums[0])
         if found < _MIN_ROWS:
             continue
-        ray_x, depth_m = ray_x / found, depth_m / found
+        x, depth_m = sums[1] / found, sums[2] / found
         middle_m = np.median(shift_m[:found])
         spread_m = _MEDIAN * np.median(np.abs(shift_m[:found] - middle_m))
         variance = 2.0 * (_QUANTUM * step * depth_m) ** 2 + spread_m * spread_m * _ROWS_ALIKE / found
-        across = 1.0 / math.sqrt(1.0 + ray_x * ray_x)
+        across = 1.0 / math.sqrt(1.0 + x * x)
         mps[t], sigma_mps[t] = across * middle_m / lag_s, across * math.sqrt(variance) / lag_s
-        direction[t, 0], direction[t, 2] = across, -across * ray_x
+        direction[t, 0], direction[t, 2] = across, -across * x
     return mps, sigma_mps, direction
 
 
 def one_way_s(so_far_s: FloatArray, rims: RimVelocities, sigmas: float, dt_s: float) -> FloatArray:
-    """(T,) for how long rims have shown motion in one direction, negative to the left, after a further frame."""
+    """(T,) for how long rims have shown motion one way without a break, after a further frame of dt_s.
+
+    Negative to the left. sigmas: so clear it has to be.
+    """
     clear = np.abs(rims.mps) > sigmas * np.hypot(rims.sigma_mps, _FLOOR_SIGMA_MPS)
     way = np.sign(rims.mps)
     before_s = np.where(np.sign(so_far_s) == way, so_far_s, 0.0)
     return np.where(clear, before_s + way * dt_s, 0.0)
 
 
-def fuse(tracks: Tracks, rims: RimVelocities, chosen: Flags, dt_s: float) -> None:
-    """Update both filters of the chosen (T,) tracks with their velocities by rims, dt_s after the frame before."""
-    use = (chosen & np.isfinite(rims.sigma_mps)).nonzero()[0]
+def fuse(tracks: Tracks, rims: RimVelocities, dt_s: float) -> None:
+    """Update both filters of the tracks with their velocities by rims. dt_s: since the frame before."""
+    use = np.isfinite(rims.sigma_mps).nonzero()[0]
     if len(use) == 0:
         return
     direction = rims.direction[use]

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from config.perception import DepthNoise
 from hal.compiled import compiled
-from hal.types import Flags, FloatArray, Intrinsics, Pose
+from hal.types import FloatArray, Intrinsics, Pose
 from vision.bodies.grouping import ExpectedBodies
 from vision.bodies.tracks import Tracks
 from vision.camera.lens import ray_through
@@ -49,11 +49,8 @@ _JUMP_M = 0.3  # plus two sigmas of depth: a centroid farther from its predictio
 _NOT_VISIBLE, _WHOLE, _PARTIAL, _POSITION_ONLY, _NEARLY_HIDDEN = range(5)
 
 
-def update_from_surfaces(tracks: Tracks, detection: Detection, measured: Regions, noise: DepthNoise) -> Flags:
-    """Update tracks with the surfaces measured, entry k for track k; one without cells stays predicted.
-
-    Returns the tracks whose velocity the centre of the whole surface has measured, (T,).
-    """
+def update_from_surfaces(tracks: Tracks, detection: Detection, measured: Regions, noise: DepthNoise) -> None:
+    """Update tracks with the surfaces measured, entry k for track k; one without cells stays predicted."""
     kind, centre_m, change, tracks.area_m2 = _kinds(
         measured,
         tracks,
@@ -70,7 +67,6 @@ def update_from_surfaces(tracks: Tracks, detection: Detection, measured: Regions
     growth_mps = change * measured.extent_m[:, 0] / _AREA_MEMORY_S
     tracks.growth_mps = np.where(kind != _NOT_VISIBLE, growth_mps, tracks.growth_mps)
     _note_view(tracks, detection, measured, kind)
-    return np.asarray(kind == _WHOLE)
 
 
 def forget_implausible(tracks: Tracks, fastest_mps: float, sigma_mps: float) -> None:

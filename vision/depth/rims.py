@@ -69,7 +69,7 @@ def _is_free(
             return False
         beside = farthest if beyond[row, j] else inverse[row, j]
         if beside > 0.0:
-            return inverse[row, rim] - beside > farther
+            return bool(inverse[row, rim] - beside > farther)
     return True
 
 

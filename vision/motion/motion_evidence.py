@@ -95,7 +95,8 @@ def evidence_of(
 ) -> MotionEvidence:
     """Gather the evidence of this frame; the filters of tracks have to be updated before.
 
-    body: velocities of the tracks by their fragments. advances, arrived, cells, rim_mps (T,): see MotionEvidence.
+    body: velocities of the tracks by their fragments. advances, arrived, cells, rim_mps (T,): see
+    MotionEvidence.
     """
     rotation = detection.pose.rotation
     sight, distance_m = tracks.sight(detection.pose.translation_m)
