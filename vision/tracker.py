@@ -2,8 +2,9 @@
 
 Steps, with their modules: velocities of fragments (least_squares); arrived and stayed surfaces (arrivals);
 cells to tracks (masks, connected, votes, grouping, births); suspects cut out (carving); movers extended to
-the floor (grounding); bodies joined and divided (merging, division); filters (sightings); fragments to tracks
-(adoption); velocities of bodies (least_squares); verdict (judgement); report. Terms: vision/__init__.py.
+the floor (grounding); bodies joined and divided (merging, division); filters (sightings, rim_motion);
+fragments to tracks (adoption); velocities of bodies (least_squares); verdict (judgement); report. Terms:
+vision/__init__.py.
 """
 
 from __future__ import annotations

@@ -33,6 +33,10 @@ _MIN_ROWS = 8  # fewer are a hand, or the corner of something
 _ROWS_ALIKE = 5.0  # rows that share their noise: a cell is a median over 5x5 cells
 _MEDIAN = 1.2533 * 1.4826  # sigma of a median of one value, in median absolute deviations
 _QUANTUM = 0.29  # cells, sigma of a uniform distribution over one: all rows of an upright edge share it
+# The outline of a walker swings with his steps by this share of his speed, one standard deviation: on walkers
+# of another renderer, 0.9 m/s in the mean, the error is 0.08 m/s in the median and 0.24 m/s at the 90th
+# percentile.
+_GAIT, _STEP_S = 0.15, 0.5
 _FLOOR_SIGMA_MPS = 0.03  # added sigma: error of the camera's own motion, as in vision/motion/line_of_sight.py
 _UNKNOWN_MPS = 100.0  # sigma in the directions that a rim does not measure
 
@@ -200,8 +204,10 @@ def fuse(tracks: Tracks, rims: RimVelocities, dt_s: float) -> None:
     if len(use) == 0:
         return
     direction = rims.direction[use]
-    # The time windows of successive frames overlap: a frame adds dt / window of a new measurement.
-    variance = rims.sigma_mps[use] ** 2 * rims.lag_s[use] / dt_s
+    # The time windows of successive frames overlap: a frame adds dt / window of a new measurement. The swing
+    # of the outline lasts as long as a step.
+    swing_mps = _GAIT * tracks.speed_mps[use] * tracks.moving[use]
+    variance = (rims.sigma_mps[use] ** 2 * rims.lag_s[use] + swing_mps**2 * _STEP_S) / dt_s
     along = direction[:, :, None] * direction[:, None, :]
     noise = _UNKNOWN_MPS**2 * (np.eye(3) - along) + variance[:, None, None] * along
     velocity = rims.mps[use, None] * direction

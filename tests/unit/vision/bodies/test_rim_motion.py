@@ -135,6 +135,20 @@ def test_time_of_motion_one_way_ends_where_it_turns_or_is_not_clear() -> None:
     assert rim_motion.one_way_s(so_far_s, rims(0.0, math.inf), 4.0, 0.03)[0] == 0.0
 
 
+def test_a_walkers_outline_swings_so_that_a_frame_of_it_weighs_less() -> None:
+    """The variance of a frame is 0.05^2 * 0.2 / 0.05, and (0.15 * 1 m/s)^2 * 0.5 / 0.05 more if he walks."""
+    across, spread = np.array([0.6, 0.0, -0.8]), []
+    for moving in (False, True):
+        tracks = tracks_of()
+        tracks.state[:, 3:] = across
+        tracks.moving[:] = moving
+        rim_motion.fuse(tracks, rims(1.0, 0.05), 0.05)
+        spread.append(across @ tracks.covariance[0, 3:, 3:] @ across)
+    stands, walks = spread
+    assert 1.0 / stands - 1.0 / 1.5**2 == pytest.approx(1.0 / 0.01, rel=0.01)
+    assert 1.0 / walks - 1.0 / 1.5**2 == pytest.approx(1.0 / 0.235, rel=0.01)
+
+
 def test_the_filters_take_the_velocity_in_the_direction_that_rims_measure_only() -> None:
     tracks = tracks_of(2)
     one = rims(0.8, 0.05)
