@@ -25,10 +25,10 @@ from vision.depth.rims import NO_RIM, FreeRims, free_rims
 from vision.numerics import kalman
 from vision.numerics.relative_pose import NEAREST_M, Row, coordinate_m, relative_row
 
-# Rims are compared over this time: a walking person moves by 0.2 m, five times the width of a cell 6 m away,
-# and less than a step long, so that a leg does not change its side.
-_LOOK_BACK_S = 0.2
-_SHORTEST_S = 0.1  # for tracks that are younger; in less time the width of a cell is as much as a slow walk
+# Rims are compared over 0.2 s, rounded to frames: a walking person moves by 0.2 m, five times the width of a
+# cell 6 m away, and by less than a step, so that a leg does not change its side.
+_LOOK_BACK_NS = 220_000_000
+_SHORTEST_NS = 80_000_000  # for younger tracks; in less time the width of a cell is as much as a slow walk
 _MIN_ROWS = 8  # fewer are a hand, or the corner of something
 _ROWS_ALIKE = 5.0  # rows that share their noise: a cell is a median over 5x5 cells
 _MEDIAN = 1.2533 * 1.4826  # sigma of a median of one value, in median absolute deviations
@@ -47,8 +47,8 @@ class RimVelocities:
 
     mps: component along direction, (T,).
     sigma_mps: its standard deviation, (T,); inf where there are not enough rows of free rims now and then.
-    direction: level unit vector across the line of sight, (T, 3).
-    lag_s: time over which they are measured, (T,).
+    direction: unit vector across the line of sight, along the rows of the image, (T, 3).
+    lag_s: time over which they are measured, (T,); 0 where they are not.
     """
 
     mps: Vector
@@ -58,7 +58,7 @@ class RimVelocities:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Memory:
+class _View:
     stamp_ns: int
     track_id: NDArray[np.int64]
     rims: FreeRims
@@ -70,11 +70,11 @@ class RimMemory:
 
     def __init__(self, fastest_mps: float) -> None:
         self._fastest_mps = fastest_mps  # no body is faster
-        self._memories: list[_Memory] = []
+        self._views: list[_View] = []
 
     def clear(self) -> None:
         """Forget all rims: the poses of their views cannot be compared with those to come."""
-        self._memories.clear()
+        self._views.clear()
 
     def velocities(
         self, grid: DepthGrid, labels: IntGrid, tracks: Tracks, pose: Pose, now_ns: int
@@ -83,25 +83,30 @@ class RimMemory:
 
         Call clear first where pose cannot be compared with those before.
         """
-        rims = free_rims(grid, labels, len(tracks))
-        mps, sigma_mps = np.zeros(len(tracks)), np.full(len(tracks), np.inf)
-        direction, lag_s = np.zeros((len(tracks), 3)), np.full(len(tracks), _LOOK_BACK_S)
-        for memory in self._looked_back_at(now_ns):
-            index = tracks.index_of(memory.track_id)
-            since_s = (now_ns - memory.stamp_ns) * 1e-9
-            found = _measured(grid, rims, pose, memory.rims, memory.pose, index, since_s, self._fastest_mps)
-            new = np.isinf(sigma_mps) & np.isfinite(found[1])
-            mps, sigma_mps = np.where(new, found[0], mps), np.where(new, found[1], sigma_mps)
-            direction = np.where(new[:, None], found[2] @ pose.rotation.T, direction)
-            lag_s = np.where(new, since_s, lag_s)
-        self._memories.append(_Memory(now_ns, tracks.ids, rims, pose))
-        return RimVelocities(mps, sigma_mps, direction, lag_s)
+        now = _View(now_ns, tracks.ids, free_rims(grid, labels, len(tracks)), pose)
+        old, recent = self._looked_back_at(now)
+        found = _measured(
+            grid,
+            now.rims,
+            pose,
+            old.rims,
+            old.pose,
+            tracks.index_of(old.track_id),
+            (now_ns - old.stamp_ns) * 1e-9,
+            recent.rims,
+            recent.pose,
+            tracks.index_of(recent.track_id),
+            (now_ns - recent.stamp_ns) * 1e-9,
+            self._fastest_mps,
+        )
+        self._views.append(now)
+        return RimVelocities(*found)
 
-    def _looked_back_at(self, now_ns: int) -> list[_Memory]:
-        """The oldest view of the last _LOOK_BACK_S, and the one that serves younger tracks."""
-        self._memories = [m for m in self._memories if (now_ns - m.stamp_ns) * 1e-9 < _LOOK_BACK_S + 0.02]
-        old = [m for m in self._memories if (now_ns - m.stamp_ns) * 1e-9 > _SHORTEST_S - 0.02]
-        return old[:1] + old[1:][-1:]
+    def _looked_back_at(self, now: _View) -> tuple[_View, _View]:
+        """The oldest view that is compared, and the one for younger tracks; now where there is none."""
+        self._views = [v for v in self._views if now.stamp_ns - v.stamp_ns <= _LOOK_BACK_NS]
+        old = [v for v in self._views if now.stamp_ns - v.stamp_ns >= _SHORTEST_NS]
+        return (old[0], old[-1]) if old else (now, now)
 
 
 @inlined
@@ -144,8 +149,8 @@ def _add_shifts(
         sums[2] += depth_m
 
 
-@compiled(DepthGrid, FreeRims, Pose, FreeRims, Pose, "int64[::1], float64, float64")
-def _measured(
+@inlined
+def _measure(
     grid: DepthGrid,
     now: FreeRims,
     pose: Pose,
@@ -154,21 +159,20 @@ def _measured(
     track: Integers,
     lag_s: float,
     fastest_mps: float,
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """mps, sigma_mps and direction of RimVelocities, the latter along the camera axes.
+    into: tuple[FloatArray, FloatArray, FloatArray, FloatArray],
+) -> None:
+    """Measure the tracks that are not measured yet by comparing now with then, lag_s ago.
 
-    pose: of the camera now; old_pose: lag_s ago. track: present index of each track of then, -1 if it has
-    ended.
+    track: present index of each track of then, -1 if it has ended. into: the fields of RimVelocities.
     """
-    count, height = len(now.column), now.column.shape[2]
-    mps, sigma_mps, direction = np.zeros(count), np.full(count, np.inf), np.zeros((count, 3))
+    mps, sigma_mps, direction, lags_s = into
     rows = relative_row(pose, old_pose, 0), relative_row(pose, old_pose, 1), relative_row(pose, old_pose, 2)
-    shift_m, step = np.empty(2 * height), grid.x[1] - grid.x[0]
+    shift_m, step, sums = np.empty(2 * now.column.shape[2]), grid.x[1] - grid.x[0], np.empty(3)
     for k in range(len(track)):
         t = track[k]
-        if t < 0:
+        if t < 0 or sigma_mps[t] < np.inf:
             continue
-        sums = np.zeros(3)
+        sums[:] = 0.0
         for side in range(2):
             if then.inverse[k, side] > 0.0 and now.inverse[t, side] > 0.0:
                 old_depth_m = np.float32(1.0 / then.inverse[k, side])
@@ -183,8 +187,43 @@ def _measured(
         variance = 2.0 * (_QUANTUM * step * depth_m) ** 2 + spread_m * spread_m * _ROWS_ALIKE / found
         across = 1.0 / math.sqrt(1.0 + x * x)
         mps[t], sigma_mps[t] = across * middle_m / lag_s, across * math.sqrt(variance) / lag_s
-        direction[t, 0], direction[t, 2] = across, -across * x
-    return mps, sigma_mps, direction
+        for i in range(3):
+            direction[t, i] = across * (pose.rotation[i, 0] - x * pose.rotation[i, 2])
+        lags_s[t] = lag_s
+
+
+@compiled(
+    DepthGrid,
+    FreeRims,
+    Pose,
+    FreeRims,
+    Pose,
+    "int64[::1], float64",
+    FreeRims,
+    Pose,
+    "int64[::1], float64, float64",
+)
+def _measured(
+    grid: DepthGrid,
+    now: FreeRims,
+    pose: Pose,
+    old: FreeRims,
+    old_pose: Pose,
+    old_track: Integers,
+    old_lag_s: float,
+    recent: FreeRims,
+    recent_pose: Pose,
+    recent_track: Integers,
+    recent_lag_s: float,
+    fastest_mps: float,
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """The fields of RimVelocities: compared with the old view, or else with the recent one."""
+    count = len(now.column)
+    into = np.zeros(count), np.full(count, np.inf), np.zeros((count, 3)), np.zeros(count)
+    if old_lag_s > 0.0:
+        _measure(grid, now, pose, old, old_pose, old_track, old_lag_s, fastest_mps, into)
+        _measure(grid, now, pose, recent, recent_pose, recent_track, recent_lag_s, fastest_mps, into)
+    return into
 
 
 def one_way_s(so_far_s: FloatArray, rims: RimVelocities, sigmas: float, dt_s: float) -> FloatArray:
