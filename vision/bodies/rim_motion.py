@@ -29,6 +29,7 @@ from vision.numerics.relative_pose import NEAREST_M, Row, coordinate_m, relative
 # cell 6 m away, and by less than a step, so that a leg does not change its side.
 _LOOK_BACK_NS = 220_000_000
 _SHORTEST_NS = 80_000_000  # for younger tracks; in less time the width of a cell is as much as a slow walk
+_ALIKE_SIGMAS = 2.5  # 99 % of equal velocities differ by less
 _MIN_ROWS = 8  # fewer are a hand, or the corner of something
 _ROWS_ALIKE = 5.0  # rows that share their noise: a cell is a median over 5x5 cells
 _MEDIAN = 1.2533 * 1.4826  # sigma of a median of one value, in median absolute deviations
@@ -161,7 +162,7 @@ def _measure(
     fastest_mps: float,
     into: tuple[FloatArray, FloatArray, FloatArray, FloatArray],
 ) -> None:
-    """Measure the tracks that are not measured yet by comparing now with then, lag_s ago.
+    """Measure the tracks by comparing now with then, lag_s ago.
 
     track: present index of each track of then, -1 if it has ended. into: the fields of RimVelocities.
     """
@@ -170,7 +171,7 @@ def _measure(
     shift_m, step, sums = np.empty(2 * now.column.shape[2]), grid.x[1] - grid.x[0], np.empty(3)
     for k in range(len(track)):
         t = track[k]
-        if t < 0 or sigma_mps[t] < np.inf:
+        if t < 0:
             continue
         sums[:] = 0.0
         for side in range(2):
@@ -217,13 +218,29 @@ def _measured(
     recent_lag_s: float,
     fastest_mps: float,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """The fields of RimVelocities: compared with the old view, or else with the recent one."""
+    """The fields of RimVelocities.
+
+    They are compared with the old view, or with the recent one if the track is too young. What has moved has
+    moved as fast since both. A rim that jumped once, as cells of something else joined the body, has not:
+    nothing is measured for as long as the jump lies between the views.
+    """
     count = len(now.column)
-    into = np.zeros(count), np.full(count, np.inf), np.zeros((count, 3)), np.zeros(count)
-    if old_lag_s > 0.0:
-        _measure(grid, now, pose, old, old_pose, old_track, old_lag_s, fastest_mps, into)
-        _measure(grid, now, pose, recent, recent_pose, recent_track, recent_lag_s, fastest_mps, into)
-    return into
+    result = np.zeros(count), np.full(count, np.inf), np.zeros((count, 3)), np.zeros(count)
+    if old_lag_s <= 0.0:
+        return result
+    before = np.zeros(count), np.full(count, np.inf), np.zeros((count, 3)), np.zeros(count)
+    _measure(grid, now, pose, recent, recent_pose, recent_track, recent_lag_s, fastest_mps, result)
+    _measure(grid, now, pose, old, old_pose, old_track, old_lag_s, fastest_mps, before)
+    for t in range(count):
+        if not (result[1][t] < np.inf and before[1][t] < np.inf):
+            continue
+        apart_mps = abs(before[0][t] - result[0][t])
+        if apart_mps > _ALIKE_SIGMAS * math.hypot(before[1][t], result[1][t]):
+            result[0][t], result[1][t] = 0.0, np.inf
+            continue
+        result[0][t], result[1][t] = before[0][t], before[1][t]
+        result[2][t], result[3][t] = before[2][t], before[3][t]
+    return result
 
 
 def one_way_s(so_far_s: FloatArray, rims: RimVelocities, sigmas: float, dt_s: float) -> FloatArray:

@@ -90,6 +90,17 @@ def test_an_arm_that_swings_does_not_carry_the_body_along() -> None:
     assert abs(found.mps[0]) < 0.05
 
 
+@pytest.mark.parametrize("frames_ago", range(1, 7))
+def test_a_rim_that_jumps_once_tells_no_velocity(frames_ago: int) -> None:
+    """A post beside what stands joins it: 0.21 m to the right from one frame to the next, and stays there."""
+    stood = 9 - frames_ago
+    views = [nearest(body(0.0), wall(7.0))] * stood
+    views += [nearest(body(0.0), plate(BODY_M, (0.2, 0.46), (-0.8, 0.8)), wall(7.0))] * frames_ago
+    occluder = plate(2.0, (-1.5, 0.0), (-1.2, 1.2))
+    found = measured([nearest(view, occluder) for view in views])
+    assert np.isinf(found.sigma_mps[0])
+
+
 def test_the_cameras_own_motion_is_taken_out() -> None:
     """The camera goes 0.1 m to the right and 0.3 m ahead; the body stands, its image goes the other way."""
     poses = [Pose(np.eye(3), np.array([0.1, 0.0, 0.3]) * k / 6.0) for k in range(7)]
