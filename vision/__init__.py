@@ -24,6 +24,8 @@ Terms:
 * mover: a track that moves by the verdict, or has some evidence of motion.
 * suspect: a mover that was cut out of another track and has yet to prove that it moves.
 * surface: the cells of one track in one frame, the visible side of its body.
+* free rim of a surface: where it ends in front of something farther, so that the end is its own outline
+  (vision/depth/rims.py).
 * arrived cell: its surface is in space that was seen free a moment ago (vision/bodies/arrivals.py).
 * residual of an end: how far it is seen from where it would be if it were static
   (vision/motion/residuals.py).

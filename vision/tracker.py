@@ -2,8 +2,9 @@
 
 Steps, with their modules: velocities of fragments (least_squares); arrived and stayed surfaces (arrivals);
 cells to tracks (masks, connected, votes, grouping, births); suspects cut out (carving); movers extended to
-the floor (grounding); bodies joined and divided (merging, division); filters (sightings); fragments to tracks
-(adoption); velocities of bodies (least_squares); verdict (judgement); report. Terms: vision/__init__.py.
+the floor (grounding); bodies joined and divided (merging, division); filters (sightings, rim_motion);
+fragments to tracks (adoption); velocities of bodies (least_squares); verdict (judgement); report. Terms:
+vision/__init__.py.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from vision.bodies import (
     masks,
     merging,
     report,
+    rim_motion,
     sightings,
     votes,
 )
@@ -60,6 +62,7 @@ class Tracker:
         self._tracks = Tracks()
         self._free = ViewMemory(config.depth_noise)
         self._near_floor = NearFloor(config.min_depth_m)
+        self._rims = rim_motion.RimMemory(IMPLAUSIBLE_SPEED_FACTOR * config.motion.max_speed_mps)
         self._surfaces = masks.NO_TRACK_SURFACES
         self._fragment_ids = np.empty(0, np.int64)
         self._fragment_owner = np.empty(0, np.int64)
@@ -74,6 +77,8 @@ class Tracker:
             self._last_ns = None  # time itself may have stepped back
         if detection.restarted or not detection.motion_known:
             self._free.clear()
+        if detection.restarted or detection.blurred or not detection.motion_known:
+            self._rims.clear()
         elapsed_s = 0.0 if self._last_ns is None else (detection.captured_ns - self._last_ns) * 1e-9
         elapsed_s = min(max(elapsed_s, 0.0), self._config.max_gap_s)
         tracks.predict(elapsed_s, _ACCEL_DENSITY, sightings.floor_normal(detection))
@@ -107,6 +112,9 @@ class Tracker:
         sightings.update_from_surfaces(
             tracks, detection, occlusion.with_occlusion(grid, labels, measured), self._config.depth_noise
         )
+        rims = self._rims.velocities(grid, labels, tracks, pose, detection.captured_ns)
+        if detection.dt_s > 0:
+            rim_motion.fuse(tracks, rims, detection.dt_s)
         max_mps = self._config.motion.max_speed_mps
         sightings.forget_implausible(tracks, IMPLAUSIBLE_SPEED_FACTOR * max_mps, max_mps)
         if tracks.overhead.any():
@@ -114,7 +122,7 @@ class Tracker:
         owner = adopt(tracks, detection, whole, owner, self._config.depth_noise)
         arrivals = masks.count_cells(whole, changes.arrived_cells, len(tracks))
         if detection.dt_s > 0 and len(tracks):
-            self._measure_velocities(detection, owner, velocities, arrivals, measured.cells)
+            self._measure_velocities(detection, owner, velocities, arrivals, measured.cells, rims)
         self._surfaces = masks.surfaces(grid, labels, tracks.ids, pose)
         return owner
 
@@ -205,6 +213,7 @@ class Tracker:
         velocities: FragmentVelocities,
         arrivals: NDArray[np.intp],
         cells: NDArray[np.intp],
+        rims: rim_motion.RimVelocities,
     ) -> None:
         """One weighted least squares per body, fused into its filter; then the verdict."""
         tracks, settings = self._tracks, self._config.motion
@@ -237,8 +246,11 @@ class Tracker:
             )
         tracks.restless_s = _sustained(tracks.restless_s, limbs.restless(body), detection.dt_s)
         tracks.arriving_s = _sustained(tracks.arriving_s, arriving(arrivals, cells), detection.dt_s)
+        tracks.rim_s = rim_motion.one_way_s(tracks.rim_s, rims, settings.sigmas, detection.dt_s)
         advances = tracks.update_trailing_average(detection.dt_s)
-        seen = evidence_of(tracks, detection, body, advances, arrivals, cells, self._config.depth_noise)
+        seen = evidence_of(
+            tracks, detection, body, advances, arrivals, cells, rims.mps, self._config.depth_noise
+        )
         verdict = judge(seen, tracks.evidence, tracks.moving, detection.dt_s, settings)
         tracks.evidence, tracks.moving = verdict.evidence, verdict.moving
         tracks.confidence, tracks.surely_static = verdict.confidence, verdict.surely_static

@@ -221,6 +221,8 @@ def any_evidence(seed: int, count: int, trusted: bool) -> MotionEvidence:
         cells=rng.integers(40, 200, count),
         size_m=rng.uniform(0.0, 4.0, count),
         velocity_measured_s=rng.uniform(0.0, 1.0, count),
+        rim_mps=rng.normal(0.0, 1.0, count),
+        rim_s=rng.uniform(0.0, 0.3, count),
         view_radps=rng.uniform(0.0, 1.0, count),
         growth_mps=rng.uniform(0.0, 1.0, count),
         advances=rng.random(count) < 0.5,

@@ -15,6 +15,7 @@ Files, in the order in which they come into play within one frame (vision/tracke
 * division - one track that holds two bodies is divided.
 * boxes - geometry of boxes; used by grouping, merging and report.
 * sightings - the Kalman filters are updated by the centroids of the visible surfaces.
+* rim_motion - the speed of half hidden bodies by their free rims.
 * adoption - each fragment is assigned to a track.
 * proof - what one frame proves of each track: moving, standing still or neither.
 * proof_rules - the rules for that, one function each.

@@ -21,6 +21,7 @@ _FRAME_PROOF = 3.0  # squared sigmas of this frame, so that the proof does not r
 _SHARED_PROOF = 0.55  # of the threshold, where the surface confirms the velocity of the fragments
 _LASTING_ARRIVAL_S = 0.12  # of no static surface do enough cells arrive in two successive frames
 STANDING_SHARE = 0.6  # of the minimum speed: a slower track stands still
+_LASTING_RIM_S = 0.12  # rims of static surfaces seldom show motion in three successive frames, never in five
 _MEASURED_ACROSS_S = 0.25  # static surfaces seldom show a false speed across the line of sight for longer
 _MEASURED_ALONG_S = 0.5  # somewhat longer along it, where neighbours share the noise of depth
 _CLEAR_WAY = 4.0  # times the depth noise of one pixel: shared noise never shows so large a displacement
@@ -70,6 +71,14 @@ class Surface(NamedTuple):
     velocity_measured_s: float
     wander_mps: float
     depth_sigma_m: float
+
+
+class Rim(NamedTuple):
+    """Motion of one track's free rims. wander_mps: how fast they may move while the body is static."""
+
+    speed_mps: float
+    shown_s: float
+    wander_mps: float
 
 
 class Arrival(NamedTuple):
@@ -170,6 +179,17 @@ def by_surface(centre: Velocity, seen: Surface, least_mps: float, dt_s: float, t
     even = seen.cells >= EVEN_CELLS
     clear = clear or (even and centre.along > threshold and seen.velocity_measured_s >= long_s)
     return clear and seen.size_m <= _COMPACT_M and centre.speed_mps > least_mps + seen.wander_mps
+
+
+@inlined
+def by_rim(rim: Rim, size_m: float, least_mps: float, dt_s: float) -> bool:
+    """Whether the free rims of a compact body go one way for too long to be chance.
+
+    Of what is static, rims jump where other cells join it, but they do not go on. Up to wander_mps proves
+    nothing: as the viewpoint changes, another side of a static thing becomes its outline.
+    """
+    lasting = rim.shown_s >= max(_LASTING_RIM_S, _MEASURED_FRAMES * dt_s)
+    return lasting and size_m <= _COMPACT_M and rim.speed_mps > least_mps + rim.wander_mps
 
 
 @inlined

@@ -72,6 +72,7 @@ class Tracks:
     restless_s: Vector = _column(float)
     # Time in which part of the surface was newly arrived, less the time in which none was.
     arriving_s: Vector = _column(float)
+    rim_s: Vector = _column(float)  # for how long its free rims have gone one way; negative to the left
     _next_id: int = field(default=1, init=False)
 
     def __len__(self) -> int:

@@ -8,6 +8,7 @@ Files, in the order in which they come into play:
 * connected - cells that stand out of the floor, and their connected parts.
 * regions - box, centre and size of each part.
 * occlusion - whether something nearer hides its sides or its lower end.
+* rims - free rims: where a part ends in front of something farther.
 * level_bands - the upright bands of the view in which free space is given.
 * near_floor - learns how near to the camera the floor can be measured.
 * free_space - the nearest surface and the known distance in each band: FreeSpace.

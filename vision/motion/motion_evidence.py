@@ -44,6 +44,8 @@ class MotionEvidence:
     arriving_s: for how long part of the surface has been newly arrived.
     size_m: largest extent of the surface.
     velocity_measured_s: for how long the centre has measured the velocity without a break.
+    rim_mps: speed across the line of sight by its free rims, 0 where they show none.
+    rim_s: for how long they have shown motion without a break.
     view_radps: how fast the viewing direction changes.
     growth_mps: speed of the centre that a growing or shrinking visible part can explain.
     advances: the centre really advances about as fast as the velocity says.
@@ -72,6 +74,8 @@ class MotionEvidence:
     cells: Integers
     size_m: Vector
     velocity_measured_s: Vector
+    rim_mps: Vector
+    rim_s: Vector
     view_radps: Vector
     growth_mps: Vector
     advances: Flags
@@ -89,11 +93,13 @@ def evidence_of(
     advances: NDArray[np.bool_],
     arrived: NDArray[np.intp],
     cells: NDArray[np.intp],
+    rim_mps: FloatArray,
     noise: DepthNoise,
 ) -> MotionEvidence:
     """Gather the evidence of this frame; the filters of tracks have to be updated before.
 
-    body: velocities of the tracks by their fragments. advances, arrived, cells (T,): see MotionEvidence.
+    body: velocities of the tracks by their fragments. advances, arrived, cells, rim_mps (T,): see
+    MotionEvidence.
     """
     rotation = detection.pose.rotation
     sight, distance_m = tracks.sight(detection.pose.translation_m)
@@ -116,6 +122,8 @@ def evidence_of(
         cells=cells,
         size_m=tracks.extent_m.max(axis=1),
         velocity_measured_s=tracks.velocity_measured_s,
+        rim_mps=rim_mps,
+        rim_s=np.abs(tracks.rim_s),
         growth_mps=tracks.growth_mps,
         up=sightings.floor_normal(detection),
         view_radps=view_radps(detection, sight, distance_m),

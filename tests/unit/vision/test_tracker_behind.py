@@ -37,11 +37,13 @@ def test_a_mover_that_lost_all_of_its_parts_is_not_shown_a_frame_longer(
 
 
 def test_behind_something_at_about_his_depth_nobody_is_shown() -> None:
-    """As connected depth he is one with the crate; in frame 42 0.1 m of him is left to see."""
+    """As connected depth he is one with the crate; in frame 46 5 cm of him are left to see, then nothing."""
     crate = plate(3.94, (0.3, 1.5), (-0.7, 1.0))
     percepts = track([nearest(crate, walker(-0.7 + way_m(k)), _BACK) for k in range(56)])
-    assert len(moving(percepts[36])) == 1
-    assert not any(moving(percept) for percept in percepts[46:])
+    for percept in percepts[36:47]:
+        (one,) = moving(percept)
+        np.testing.assert_allclose(one.velocity_mps, [0.8, 0.0, 0.0], atol=0.05)
+    assert not any(moving(percept) for percept in percepts[51:])  # shown for 0.15 s longer
 
 
 def pusher(frame: int) -> FloatArray:
@@ -66,3 +68,19 @@ def test_a_person_who_passes_a_low_static_thing_is_divided_from_it() -> None:
     for percept in percepts[62:]:
         (one,) = moving(percept)
         assert one.extent_m[0] < 0.8
+
+
+def test_who_comes_out_from_behind_something_moves_before_all_of_him_is_seen() -> None:
+    """Behind him nothing is measured, so nothing arrives; his middle goes half as fast as he does."""
+    shelf = plate(2.0, (-1.5, 0.0), (-1.2, 1.2))
+    percepts = track([nearest(walker(-0.25 + way_m(k)), shelf) for k in range(15)])
+    (mover,) = moving(percepts[-1])  # 0.13 m of him are still hidden
+    np.testing.assert_allclose(mover.velocity_mps, [0.8, 0.0, 0.0], atol=0.15)
+
+
+def test_what_stands_and_is_uncovered_never_moves() -> None:
+    views = [
+        nearest(walker(0.0), plate(2.0, (-1.5, 0.12 - 0.5 * way_m(k)), (-1.2, 1.2)), _BACK) for k in range(40)
+    ]
+    for percept in track(views):
+        assert not [one for one in moving(percept) if one.position_m[2] > 3.0]

@@ -143,6 +143,26 @@ def test_a_displacement_far_beyond_depth_noise_proves_motion_as_soon_along_as_ac
     assert not rises(by_surface(ALONG, 0.2, depth_sigma_m=np.array([0.01])))
 
 
+def by_rim(rim_mps: float = 0.8, rim_s: float = 0.15, **changes: Any) -> MotionEvidence:
+    """A half hidden body: nothing but its free rims tells that it goes."""
+    return one(ACROSS, **{"rim_mps": np.array([rim_mps]), "rim_s": np.array([rim_s]), **changes})
+
+
+def test_free_rims_that_go_one_way_long_enough_prove_motion() -> None:
+    assert rises(by_rim())
+    assert rises(by_rim(-0.8))
+    assert not rises(by_rim(rim_s=0.1))
+    assert not rises(by_rim(0.2))  # slower than 0.21 m/s
+    assert not rises(by_rim(2.5))  # faster than anything
+
+
+def test_free_rims_prove_nothing_for_what_is_large_or_that_a_new_viewpoint_explains() -> None:
+    assert rises(by_rim(size_m=np.array([2.1])))
+    assert not rises(by_rim(size_m=np.array([2.3])))
+    assert rises(by_rim(view_radps=np.array([1.4])))  # 0.5 * 0.8 m * 1.4 rad/s = 0.56 m/s, and 0.21
+    assert not rises(by_rim(view_radps=np.array([1.6])))
+
+
 @pytest.mark.parametrize(("looks", "proves"), [(2, False), (3, True)])
 @pytest.mark.parametrize("velocity", [ACROSS, ALONG])
 def test_a_surface_proves_only_after_three_looks_however_few_frames_there_are(
@@ -220,6 +240,7 @@ EVIDENT = {
     "fragments across": by_fragments(ACROSS, 20),
     "fragments along": by_fragments(ALONG, 20),
     "surface": by_surface(ACROSS, 1.0),
+    "free rims": by_rim(),
     "arrival": one(ACROSS, arrived=np.array([10])),
     "much has come": one(STILL, arrived=np.array([60])),
     "lasting arrival": one(

@@ -1,0 +1,115 @@
+"""Free rims: where a part ends in front of something farther, so that the end is its own outline.
+
+Where a part ends beside something nearer, the end is the outline of what hides it. Such an end moves with
+what is in front and tells nothing of the part. Used after the cells have been labelled;
+vision/bodies/rim_motion.py measures with the rims how fast a half hidden body goes sideways.
+Terms (cell, part): vision/__init__.py.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hal.compiled import compiled, inlined
+from hal.types import FloatArray, Matrix
+from vision.depth.connected import IntGrid
+from vision.depth.depth_grid import BoolGrid, DepthGrid, FloatGrid
+
+LEFT, RIGHT = 0, 1
+NO_RIM = -1
+# Beside a nearer surface a stereo camera measures nothing in a band whose width is the difference of the two
+# disparities: 24 px for a surface 1.3 m away (baseline 5 cm, focal length 611 px), less farther away. So what
+# hides a part begins within this many cells of its rim. No depth for longer means that the view goes on
+# behind the part: beyond the range, or on to a wall without texture.
+_SHADOW_CELLS = 6
+_FARTHER = 0.012  # 1/m: three standard deviations of the depth of a cell, or 0.3 m at 5 m
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FreeRims:
+    """The free rims of R parts, LEFT and RIGHT of each.
+
+    column: of the outermost cell in each row; NO_RIM where the part has no cell, or is not free on that side,
+        (R, 2, h).
+    inverse: mean inverse depth of each rim, 1/m; 0 where there is none, (R, 2).
+    """
+
+    column: Annotated[NDArray[np.int32], "int32[:, :, ::1]"]
+    inverse: Matrix
+
+
+def free_rims(grid: DepthGrid, labels: IntGrid, count: int) -> FreeRims:
+    """The free rims of the parts 1..count of labels (h, w)."""
+    farthest, farther = np.float32(1.0 / grid.range_m), np.float32(_FARTHER)
+    return FreeRims(*_free_rims(grid.inverse_depth, grid.beyond, labels, count, farthest, farther))
+
+
+@inlined
+def _is_free(
+    inverse: FloatGrid,
+    beyond: BoolGrid,
+    row: int,
+    rim: int,
+    outwards: int,
+    farthest: np.float32,
+    farther: np.float32,
+) -> bool:
+    """Whether what is next beside the cell at rim is farther, or too far away to be measured.
+
+    outwards: -1 for a left rim, 1 for a right one. farthest: 1/m, at the end of the range.
+    """
+    j = rim
+    for _ in range(_SHADOW_CELLS):
+        j += outwards
+        if j < 0 or j >= inverse.shape[1]:
+            return False
+        beside = farthest if beyond[row, j] else inverse[row, j]
+        if beside > 0.0:
+            return bool(inverse[row, rim] - beside > farther)
+    return True
+
+
+@compiled("float32[:, ::1], boolean[:, ::1], int32[:, ::1], int64, float32, float32")
+def _free_rims(
+    inverse: FloatGrid,
+    beyond: BoolGrid,
+    labels: IntGrid,
+    count: int,
+    farthest: np.float32,
+    farther: np.float32,
+) -> tuple[NDArray[np.int32], FloatArray]:
+    """As free_rims. farthest: 1/m, at the end of the range. farther: 1/m, more than noise."""
+    height, width = labels.shape
+    column = np.full((count, 2, height), NO_RIM, np.int32)
+    sums, rows = np.zeros((count, 2)), np.zeros((count, 2))
+    last = np.empty(count, np.int32)  # the last cell of each part in this row; NO_RIM before its first
+    for i in range(height):
+        last[:] = NO_RIM
+        before = 0
+        for j in range(width):
+            here = labels[i, j]
+            if here == before:
+                continue
+            if 0 < before <= count:
+                last[before - 1] = j - 1
+            if 0 < here <= count and last[here - 1] == NO_RIM:
+                column[here - 1, LEFT, i] = j
+            before = here
+        if 0 < before <= count:
+            last[before - 1] = width - 1
+        for part in range(count):
+            column[part, RIGHT, i] = last[part]
+            for side in range(2):
+                rim = column[part, side, i]
+                if rim == NO_RIM:
+                    continue
+                if _is_free(inverse, beyond, i, rim, 2 * side - 1, farthest, farther):
+                    sums[part, side] += inverse[i, rim]
+                    rows[part, side] += 1.0
+                else:
+                    column[part, side, i] = NO_RIM
+    return column, sums / np.maximum(rows, 1.0)
