@@ -44,7 +44,7 @@ _MAX_BOX_HALF_M = 0.8
 # Half width up to which a standing body is no box but a strip: along a rack there are dozens of strips a
 # centimetre or two wide, different ones in each frame. Poles are wider.
 _MIN_BOX_HALF_WIDTH_M = 0.015
-# A new track is no newcomer if something stood within this distance of its place, this long ago.
+# A new track is no newcomer if something stood within this distance of its place, this long before.
 _BEFORE_NS = 200_000_000
 _SAME_PLACE_M = 0.25
 _FUTURE_S = 0.005  # tolerance of the scene's time stamp
@@ -94,8 +94,9 @@ class WorldModel:
         self._velocity_filter = SteadyVelocities()
         self._out_of_view = OutOfView(mount, robot.limits.max_obstacle_speed_mps)
         self.edges = ViewEdges(edge_tan=0.5, near_m=config.sight.near_m, up_tan=math.inf)
-        # Of the last scenes: capture time, surface points (K, 2) and centres of bodies (M, 2).
-        self._places: deque[tuple[int, FloatArray, FloatArray]] = deque()
+        # Of the last scenes: capture time, and points where something stood (K, 2).
+        self._places: deque[tuple[int, FloatArray]] = deque()
+        self._renumbered: set[int] = set()  # ids of tracks that began where something had stood
         self._captured_ns: int | None = None
         self._scene_fault = ""
 
@@ -117,6 +118,7 @@ class WorldModel:
             before._out_of_view,
             before._places,
         )
+        self._renumbered = before._renumbered
         self._poses, self.surfaces, self.lens = before._poses, before.surfaces, before.lens
         self.health, self.edges = before.health, before.edges
         self._captured_ns, self._scene_fault = before._captured_ns, before._scene_fault
@@ -193,7 +195,7 @@ class WorldModel:
         self._boxes, self._seen, self._boxed, self._unboxed = boxes, seen, boxed, None
         self.lens.look(free, self.corridor.half_width_at(s_m), self._mount.left_m)
         self.sight.look(free, surfaces, pose, s_m, scene.captured_ns, boxes, standing)
-        self._places.append((scene.captured_ns, surfaces.points_m, seen.xy_m))
+        self._places.append((scene.captured_ns, _standing_places(surfaces.points_m, seen)))
         self.health = scene.health
         self._captured_ns = scene.captured_ns
         return ""
@@ -206,20 +208,40 @@ class WorldModel:
         return ViewEdges(edge_tan, max(self._config.sight.near_m, free.floor_from_m), free.up_tan)
 
     def _age_known_places(self, bodies: Bodies) -> Bodies:
-        """The bodies, where a new track in a place that was occupied before is not taken for a newcomer.
+        """The bodies, where a new track is no newcomer if something stood in its place before it began.
 
         Its age_s is raised to MIN_TRACKED_S, whatever its new number; its tracked_s stays.
         """
         while len(self._places) > 1 and self._places[1][0] <= bodies.captured_ns - _BEFORE_NS:
             self._places.popleft()
-        if not self._places or not np.count_nonzero(bodies.age_s < MIN_TRACKED_S):
+        new = bodies.age_s < MIN_TRACKED_S
+        self._renumbered.intersection_update(bodies.ids.tolist())
+        if not self._places or not np.count_nonzero(new):
             return bodies
-        captured_ns, *places = self._places[0]
-        if captured_ns > bodies.captured_ns - _BEFORE_NS:
+        captured_ns, points = self._places[0]
+        if captured_ns <= bodies.captured_ns - _BEFORE_NS:
+            # Later on, it would be its own surface that was there before.
+            new &= bodies.tracked_s * NS_PER_S < bodies.captured_ns - captured_ns
+            there = bodies.covers(points, np.full(len(points), _SAME_PLACE_M), _SAME_PLACE_M).any(axis=0)
+            self._renumbered.update(bodies.ids[new & there].tolist())
+        if not self._renumbered:
             return bodies
-        points = np.concatenate(places)
-        there = bodies.covers(points, np.full(len(points), _SAME_PLACE_M), _SAME_PLACE_M).any(axis=0)
-        return replace(bodies, age_s=np.where(there, np.maximum(bodies.age_s, MIN_TRACKED_S), bodies.age_s))
+        known = np.array([one in self._renumbered for one in bodies.ids.tolist()])
+        return replace(bodies, age_s=np.where(known, np.maximum(bodies.age_s, MIN_TRACKED_S), bodies.age_s))
+
+
+def _standing_places(points_m: FloatArray, seen: Bodies) -> FloatArray:
+    """(K, 2) the points of surfaces (P, 2) and the centres of seen, without those of movers.
+
+    A new track where a mover has just been is a part of him. Taken for something that has long stood there,
+    an arm right before the camera would be waited for without end.
+    """
+    places = np.concatenate((points_m, seen.xy_m[~seen.moving]))
+    if not np.count_nonzero(seen.moving):
+        return places
+    movers = seen.select(seen.moving)
+    of_mover = movers.covers(places, np.full(len(places), _SAME_PLACE_M), _SAME_PLACE_M).any(axis=1)
+    return places[~of_mover]
 
 
 @compiled("float64[:], float64[:], boolean[:]")

@@ -48,6 +48,24 @@ def test_body_where_one_stood_before_keeps_its_age() -> None:
     assert age_s(0.1, 2.0) == 2.0
 
 
+def test_who_has_a_new_number_keeps_the_age_in_the_frames_that_follow() -> None:
+    renumbered = [(obstacle(4.0, 0.1, age_s=0.033 * k, number=6),) for k in range(1, 12)]
+    assert after(*CRATE, *renumbered).bodies.age_s.item() == 0.5
+
+
+def test_a_newcomer_is_not_known_by_its_own_surface_of_a_moment_ago() -> None:
+    """Something right before the camera, soon gone again: it would be waited for without end."""
+    newcomer = [(obstacle(4.0, 0.1, age_s=0.033 * k, number=6),) for k in range(1, 12)]
+    assert after(*[()] * 10, *newcomer).bodies.age_s.item() == pytest.approx(0.033 * 11)
+
+
+def test_where_a_mover_has_just_been_a_new_track_is_a_newcomer() -> None:
+    """It is a part of him, such as an arm."""
+    mover = [(replace(one, moving=True),) for (one,) in CRATE]
+    bodies = after(*mover, (obstacle(4.0, 0.1, age_s=0.03, number=6),)).bodies
+    assert bodies.age_s[bodies.ids == 6].item() == pytest.approx(0.03)
+
+
 def test_a_strip_is_no_body_unless_it_moves() -> None:
     """2 cm of a rack, or of somebody's leg: where it stands is what depth sees of it."""
     strip = obstacle(4.0, 0.1, age_s=0.6, number=6, size_m=(0.02, 0.3))
