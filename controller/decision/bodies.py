@@ -8,7 +8,7 @@ from operator import attrgetter
 import numpy as np
 from numpy.typing import NDArray
 
-from hal.compiled import compiled
+from hal.compiled import compiled, inlined
 from hal.records import record
 from hal.types import Flags, FloatArray, Integers, Matrices, Matrix, Vector
 
@@ -125,9 +125,9 @@ def no_bodies(captured_ns: int) -> Bodies:
     return Bodies(captured_ns, *_NO_ARRAYS)
 
 
-@compiled(Bodies, "float64[:, :], float64[:], float64")
-def _covers(bodies: Bodies, points_m: FloatArray, reach_m: FloatArray, side_m: float) -> NDArray[np.bool_]:
-    """As Bodies.covers."""
+@inlined
+def covering(bodies: Bodies, points_m: FloatArray, reach_m: FloatArray, side_m: float) -> NDArray[np.bool_]:
+    """As Bodies.covers, for compiled steps."""
     covered = np.empty((len(points_m), len(bodies.xy_m)), np.bool_)
     for k in range(len(bodies.xy_m)):
         cos, sin = math.cos(bodies.view_rad[k]), math.sin(bodies.view_rad[k])
@@ -137,3 +137,8 @@ def _covers(bodies: Bodies, points_m: FloatArray, reach_m: FloatArray, side_m: f
             along_m, across_m = abs(dx * cos + dy * sin), abs(dy * cos - dx * sin)
             covered[i, k] = along_m <= half_view_m + reach_m[i] and across_m <= half_across_m
     return covered
+
+
+@compiled(Bodies, "float64[:, :], float64[:], float64")
+def _covers(bodies: Bodies, points_m: FloatArray, reach_m: FloatArray, side_m: float) -> NDArray[np.bool_]:
+    return covering(bodies, points_m, reach_m, side_m)

@@ -13,6 +13,7 @@ import numpy as np
 from config.robot import Body
 from controller.decision.bodies import Bodies
 from controller.path.path import Path
+from controller.path.projection import Projection, located
 from hal.compiled import compiled, inlined
 from hal.records import record
 from hal.types import FloatArray, Matrix, Vector
@@ -55,6 +56,13 @@ class Corridor:
         """Half of the swept width at a single s_m."""
         return _one_half_width(s_m, self.half_widths_m, self.overhang_m)
 
+    def locate(self, points_m: FloatArray, from_s_m: float, to_s_m: float) -> FloatArray:
+        """(3, P) path coordinates s_m and d_m of points (P, 2), and half of the swept width there.
+
+        The path is searched from from_s_m to to_s_m.
+        """
+        return _points_along(self.path.projection, self, points_m, from_s_m, to_s_m)
+
 
 @record(frozen=True, slots=True, eq=False)
 class Placed:
@@ -82,10 +90,8 @@ def place(bodies: Bodies, corridor: Corridor, times_s: FloatArray, near_s_m: flo
 
     The path is searched from _BEHIND_M behind near_s_m to reach_m ahead of it.
     """
-    reach = near_s_m - _BEHIND_M, near_s_m + reach_m
-    located = corridor.path.locate(bodies.xy_m, bodies.velocity_mps, times_s, *reach)
-    extents = _extents(located, bodies, corridor)
-    return Placed(*located, *extents)
+    from_s_m, to_s_m = near_s_m - _BEHIND_M, near_s_m + reach_m
+    return Placed(*_placed(corridor.path.projection, bodies, corridor, times_s, from_s_m, to_s_m))
 
 
 @inlined
@@ -110,15 +116,32 @@ def _half_widths(s_m: FloatArray, half_widths_m: FloatArray, overhang_m: float) 
     return half_width
 
 
-@compiled("float64[:, :, ::1]", Bodies, Corridor)
-def _extents(located: FloatArray, bodies: Bodies, corridor: Corridor) -> FloatArray:
-    """(4, N, K) half_s_m, block_from_s_m, block_to_s_m and clearance_m of Placed, for N bodies.
+@compiled(Projection, Corridor, "float64[:, :], float64, float64")
+def _points_along(
+    path: Projection, corridor: Corridor, points_m: FloatArray, from_s_m: float, to_s_m: float
+) -> FloatArray:
+    """As Corridor.locate()."""
+    points = np.empty((3, len(points_m)))
+    found = located(path, points_m, np.zeros(points_m.shape), np.zeros(1), from_s_m, to_s_m)
+    points[:2] = found[:2, :, 0]
+    for k in range(len(points_m)):
+        points[2, k] = _half_width(points[0, k], corridor.half_widths_m, corridor.overhang_m)
+    return points
 
-    located (3, N, K): s_m, d_m and heading_rad of Placed.
-    """
-    s_m, d_m, heading_rad = located
-    extents = np.empty((4, *s_m.shape))
-    half_s, block_from, block_to, clearance = extents
+
+@compiled(Projection, Bodies, Corridor, "float64[:], float64, float64")
+def _placed(
+    path: Projection,
+    bodies: Bodies,
+    corridor: Corridor,
+    times_s: FloatArray,
+    from_s_m: float,
+    to_s_m: float,
+) -> FloatArray:
+    """(7, N, K) the fields of Placed, for N bodies; the path is searched from from_s_m to to_s_m."""
+    placed = np.empty((7, len(bodies.xy_m), len(times_s)))
+    placed[:3] = located(path, bodies.xy_m, bodies.velocity_mps, times_s, from_s_m, to_s_m)
+    s_m, d_m, heading_rad, half_s, block_from, block_to, clearance = placed
     for k in range(len(s_m)):
         along, across = bodies.half_view_m[k], bodies.half_across_m[k]
         cos = sin = 0.0
@@ -131,7 +154,7 @@ def _extents(located: FloatArray, bodies: Bodies, corridor: Corridor) -> FloatAr
             block_to[k, j] = s_m[k, j] + half_s[k, j] + corridor.rear_m
             beside = abs(d_m[k, j]) - (sin * along + cos * across)
             clearance[k, j] = beside - _half_width(s_m[k, j], corridor.half_widths_m, corridor.overhang_m)
-    return extents
+    return placed
 
 
 @record(frozen=True, slots=True, eq=False)

@@ -40,7 +40,7 @@ __all__ = ["Action", "Decision", "DecisionMaker", "Reason"]
 # Emergency braking goes on until the speed exceeds what is allowed by no more than this.
 _EMERGENCY_EXIT_MPS = 0.05
 _AT_END_M = 0.02  # the robot is at its target
-_speed_of = attrgetter("speed_mps")
+_speed_of, _urgent = attrgetter("speed_mps"), attrgetter("urgent")
 
 
 class DecisionMaker:
@@ -203,7 +203,7 @@ class DecisionMaker:
             return False
         if self._emergency and motion.v_mps > allowed_mps + _EMERGENCY_EXIT_MPS:
             return True
-        return any(limit.urgent for limit in limits)
+        return any(map(_urgent, limits))
 
     def _note_stuck(self, target_mps: float, motion: Motion, reason: Reason, now_ns: int) -> None:
         blocked = reason.rule in BLOCKING_RULES or reason.rule == "release"

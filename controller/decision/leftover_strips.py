@@ -34,7 +34,7 @@ def leftover_strips(bodies: Bodies, kept: NDArray[np.bool_]) -> NDArray[np.bool_
     older = kept & bodies.moving & (bodies.tracked_s > MIN_TRACKED_S)
     brief = np.where(bodies.moving, bodies.tracked_s <= MIN_TRACKED_S, hardly_stood(bodies))
     strips = brief & (bodies.half_across_m < MIN_MOVER_HALF_WIDTH_M)
-    if not (older.any() and strips.any()):
+    if not (np.count_nonzero(older) and np.count_nonzero(strips)):
         return np.zeros(len(bodies), np.bool_)
     others = bodies.select(older)
     velocity = np.where(bodies.moving[:, None], bodies.velocity_mps, bodies.measured_mps)

@@ -101,7 +101,7 @@ class OutOfView:
         ids = seen.ids.tolist()
         came = np.array([one in self._approached for one in ids], np.bool_)
         leaves = out & came & self._outside_view(seen, pose, edges)
-        if not leaves.any():
+        if not np.count_nonzero(leaves):
             return seen
         velocity = seen.velocity_mps.copy()
         velocity[leaves] = [self._approached[ids[k]][1] for k in np.flatnonzero(leaves).tolist()]

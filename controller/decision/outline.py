@@ -67,8 +67,8 @@ def outline_of(
         hidden_m = max(depth_m - float(np.ptp(along)), 0.0)
         outline = np.concatenate((outline, outline + hidden_m * ahead))
         half_band_m = np.concatenate((half_band_m, half_band_m))
-    s, d = corridor.path.project_points(outline, *stretch_m)
-    clear = np.abs(d) - half_band_m - corridor.half_width(s)
+    _, d_m, half_width_m = corridor.locate(outline, *stretch_m)
+    clear = np.abs(d_m) - half_band_m - half_width_m
     return Outline(float(clear.min()), whole)
 
 

@@ -80,9 +80,7 @@ def unproven(
 
     It is seen if every band that the body covers is free beyond it, or if one ends at a surface there.
     """
-    speed_mps = np.hypot(bodies.measured_mps[:, 0], bodies.measured_mps[:, 1])
-    stood = ~bodies.moving & (bodies.tracked_s >= _STOOD_S) & (speed_mps <= _STOOD_MPS)
-    unseen = _unproven(bodies, stood, pose, mount, free)
+    unseen = _unproven(bodies, pose, mount, free)
     if np.count_nonzero(unseen):
         ahead, _ = _in_camera(bodies, pose, mount)
         unseen &= ~beyond_edges(bodies, ahead - bodies.half_view_m, mount.height_m, edges)
@@ -114,19 +112,19 @@ def _is_free(free: FreeSpace, bands: NDArray[np.bool_], far_m: float) -> bool:
     return len(seen) > 0 and bool(seen.all())
 
 
-@compiled(Bodies, "boolean[:]", PlanarPose, CameraMount, FreeSpace)
-def _unproven(
-    bodies: Bodies, stood: NDArray[np.bool_], pose: PlanarPose, mount: CameraMount, free: FreeSpace
-) -> NDArray[np.bool_]:
-    """As unproven(), but for bodies below or above the view. stood (N,): which bodies surely stood."""
+@compiled(Bodies, PlanarPose, CameraMount, FreeSpace)
+def _unproven(bodies: Bodies, pose: PlanarPose, mount: CameraMount, free: FreeSpace) -> NDArray[np.bool_]:
+    """As unproven(), but for bodies below or above the view."""
     cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
-    unseen = np.zeros(len(stood), np.bool_)
-    for k in range(len(stood)):
+    unseen = np.zeros(len(bodies.moving), np.bool_)
+    for k in range(len(unseen)):
         dx, dy = bodies.xy_m[k, 0] - pose.x_m, bodies.xy_m[k, 1] - pose.y_m
         ahead, right = dx * cos + dy * sin - mount.forward_m, mount.left_m - (dy * cos - dx * sin)
         half_view_m, half_across_m = bodies.half_view_m[k], bodies.half_across_m[k]
         near, far = ahead - half_view_m, ahead + half_view_m
-        if not (stood[k] and 0.0 < near <= _NEAR_M):
+        speed_mps = math.hypot(bodies.measured_mps[k, 0], bodies.measured_mps[k, 1])
+        stood = not bodies.moving[k] and bodies.tracked_s[k] >= _STOOD_S and speed_mps <= _STOOD_MPS
+        if not (stood and 0.0 < near <= _NEAR_M):
             continue
         left_edge, right_edge = right - half_across_m, right + half_across_m
         first = min(left_edge / near, left_edge / far) - free.half_width_tan

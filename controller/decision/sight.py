@@ -109,9 +109,8 @@ class Sight:
     def _on_path(self, surfaces: Surfaces, s_m: float) -> SurfacesOnPath:
         """The surfaces in path coordinates, as far as the camera sees from s_m."""
         to_s_m = s_m + self._sight.range_m + _BEYOND_RANGE_M
-        surface_s_m, surface_d_m = self._corridor.path.project_points(surfaces.points_m, s_m, to_s_m)
-        half_width_m = self._corridor.half_width(surface_s_m)
-        return SurfacesOnPath(surfaces.bands, surfaces.forward_m, surface_s_m, surface_d_m, half_width_m)
+        located = self._corridor.locate(surfaces.points_m, s_m, to_s_m)
+        return SurfacesOnPath(surfaces.bands, surfaces.forward_m, *located)
 
     def _update_view_edges(self, free: FreeSpace) -> None:
         """Take in where the view begins and ends, if that has changed.

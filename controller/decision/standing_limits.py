@@ -110,10 +110,10 @@ class StandingLimits:
         sight, margins = self._config.sight, self._config.margins
         placed = place(bodies, known.corridor, _NOW, s_m, sight.range_m + 2.0)
         clearance_m = self._clear(known, placed, s_m, before)
-        near = clearance_m <= margins.lateral_m + margins.graze_m
+        near = _stands_within(bodies.moving, clearance_m, -math.inf, margins.lateral_m + margins.graze_m)
         if self._inside:
             self._inside.difference_update(bodies.ids[~(near | bodies.moving)].tolist())
-        rows = (near & ~bodies.moving).nonzero()[0]
+        rows = near.nonzero()[0]
         if len(rows):
             stop_m = self._stop_distances(known, bodies, placed)
             fields = _columns(
@@ -139,9 +139,10 @@ class StandingLimits:
         clearance_m = placed.clearance_m[:, 0].copy()
         margins, straight = self._config.margins, known.corridor.straight
         least_m, most_m = (0.0, margins.graze_m) if straight else (-math.inf, _BESIDE_M)
-        near = (clearance_m > least_m) & (clearance_m <= margins.lateral_m + most_m)
-        beside = near & ~known.bodies.moving & (placed.block_to_s_m[:, 0] > s_m)
-        if not beside.any():
+        beside = _stands_within(known.bodies.moving, clearance_m, least_m, margins.lateral_m + most_m)
+        if np.count_nonzero(beside):
+            beside &= placed.block_to_s_m[:, 0] > s_m
+        if not np.count_nonzero(beside):
             return clearance_m
         bodies, depth_m = known.bodies.select(beside), self._config.prediction.body_depth_m
         own = known.surfaces.of(bodies)
@@ -183,6 +184,17 @@ class StandingLimits:
             self._config.margins.stop_m,
         )
         return needed <= gap.distance_m
+
+
+@compiled("boolean[:], float64[:], float64, float64")
+def _stands_within(
+    moving: NDArray[np.bool_], clearance_m: FloatArray, above_m: float, up_to_m: float
+) -> NDArray[np.bool_]:
+    """(N,) which bodies stand, with a clearance above above_m and up to up_to_m."""
+    within = np.empty(len(moving), np.bool_)
+    for k in range(len(moving)):
+        within[k] = not moving[k] and above_m < clearance_m[k] <= up_to_m
+    return within
 
 
 @compiled("int64[:], float64[:, :], float64[:, :], float64[:], float64[:], float64[:], float64[:]")

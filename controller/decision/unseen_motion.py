@@ -88,7 +88,7 @@ def with_measured_velocity(bodies: Bodies, mistaken_mps: float) -> Bodies:
     """
     goes = _before_verdict(bodies) & _faster_than(bodies, _SURE_MOVE_SIGMAS)
     goes &= np.hypot(bodies.measured_mps[:, 0], bodies.measured_mps[:, 1]) <= mistaken_mps
-    if not goes.any():
+    if not np.count_nonzero(goes):
         return bodies
     velocity = np.where(goes[:, None], bodies.measured_mps, bodies.velocity_mps)
     return replace(bodies, velocity_mps=velocity, moving=bodies.moving | goes)

@@ -68,11 +68,6 @@ class SteadyVelocities:
         return replace(seen, velocity_mps=velocity, innovation_mps=innovation)
 
 
-def missing_to_walking(velocity_mps: FloatArray) -> FloatArray:
-    """(N, 2) how much faster bodies that set off with velocity_mps (N, 2) may become, straight on."""
-    return _missing_to_walking(velocity_mps)
-
-
 @inlined
 def _missing_to_walking(velocity_mps: FloatArray) -> FloatArray:
     missing = np.zeros_like(velocity_mps)
@@ -81,6 +76,12 @@ def _missing_to_walking(velocity_mps: FloatArray) -> FloatArray:
         for axis in range(2):
             missing[k, axis] = velocity_mps[k, axis] * max(_WALKING_MPS / speed_mps - 1.0, 0.0)
     return missing
+
+
+@compiled("float64[:, :]")
+def missing_to_walking(velocity_mps: FloatArray) -> FloatArray:
+    """(N, 2) how much faster bodies that set off with velocity_mps (N, 2) may become, straight on."""
+    return _missing_to_walking(velocity_mps)
 
 
 @compiled(Bodies, "int64[:], float64[:], float64[:, :], float64[:, :], float64")

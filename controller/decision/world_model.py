@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from config.decision import DecisionConfig
 from config.perception import TYPICAL_DEPTH_NOISE, DepthNoise
 from config.robot import Robot
-from controller.decision.bodies import Bodies, no_bodies
+from controller.decision.bodies import Bodies, covering, no_bodies
 from controller.decision.corridor import Corridor
 from controller.decision.lens_cover import LensCover
 from controller.decision.limits import STANDING_MPS
@@ -230,18 +230,22 @@ class WorldModel:
         return replace(bodies, age_s=np.where(known, np.maximum(bodies.age_s, MIN_TRACKED_S), bodies.age_s))
 
 
+@compiled("float64[:, :]", Bodies)
 def _standing_places(points_m: FloatArray, seen: Bodies) -> FloatArray:
     """(K, 2) the points of surfaces (P, 2) and the centres of seen, without those of movers.
 
     A new track where a mover has just been is a part of him. Taken for something that has long stood there,
     an arm right before the camera would be waited for without end.
     """
-    places = np.concatenate((points_m, seen.xy_m[~seen.moving]))
-    if not np.count_nonzero(seen.moving):
-        return places
-    movers = seen.select(seen.moving)
-    of_mover = movers.covers(places, np.full(len(places), _SAME_PLACE_M), _SAME_PLACE_M).any(axis=1)
-    return places[~of_mover]
+    places = np.concatenate((points_m, seen.xy_m))
+    of_body = covering(seen, places, np.full(len(places), _SAME_PLACE_M), _SAME_PLACE_M)
+    stands = np.ones(len(places), np.bool_)
+    for k in range(len(seen.moving)):
+        if seen.moving[k]:
+            stands[len(points_m) + k] = False
+            for i in range(len(places)):
+                stands[i] &= not of_body[i, k]
+    return places[stands]
 
 
 @compiled("float64[:], float64[:], boolean[:]")

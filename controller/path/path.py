@@ -50,6 +50,7 @@ class OnPath:
 class Path:
     """The path in the frame of its start pose; immutable.
 
+    projection: of points onto it.
     Raises PathError when a bend is tighter than the robot can drive or the path doubles back on itself.
     """
 
@@ -62,7 +63,7 @@ class Path:
         self._y = np.array([piece.y_m for piece in pieces])
         self._heading = np.array([piece.heading_rad for piece in pieces])
         self._curvature = np.array([piece.curvature_1pm for piece in pieces])
-        self._projection = Projection(pieces, self.poses)
+        self.projection = Projection(pieces, self.poses)
         self._check_doubling_back(robot.body.width_m)
         speed_s, speed = section_speeds(spec, robot, self._curvature[1:-1], self._s[1:-1])
         self._speed_step_m = float(speed_s[1] - speed_s[0])
@@ -107,7 +108,7 @@ class Path:
         It is searched from 0.25 m behind hint_s_m to 2 m ahead of it only, so that it cannot jump to another
         part of the path that is near.
         """
-        s, d, heading = self._projection.project(
+        s, d, heading = self.projection.project(
             pose.x_m, pose.y_m, hint_s_m - _LOOK_BACK_M, hint_s_m + _LOOK_AHEAD_M
         )
         return OnPath(s, d, wrap_angle_rad(pose.heading_rad - heading))
@@ -116,22 +117,8 @@ class Path:
         self, points_m: FloatArray, from_s_m: float = -math.inf, to_s_m: float = math.inf
     ) -> tuple[FloatArray, FloatArray]:
         """Path coordinates s_m (N,), d_m (N,) of points (N, 2), on the part from_s_m..to_s_m of the path."""
-        located = self._projection.locate(points_m, np.zeros(points_m.shape), _NOW, from_s_m, to_s_m)
+        located = self.projection.locate(points_m, np.zeros(points_m.shape), _NOW, from_s_m, to_s_m)
         return located[0, :, 0], located[1, :, 0]
-
-    def locate(
-        self,
-        points_m: FloatArray,
-        velocity_mps: FloatArray,
-        times_s: FloatArray,
-        from_s_m: float,
-        to_s_m: float,
-    ) -> FloatArray:
-        """(3, N, K) s_m, d_m, heading_rad of the path (not wrapped) of moving points, times_s (K,) from now.
-
-        They move from points_m (N, 2) with constant velocity_mps (N, 2). from_s_m, to_s_m: as before.
-        """
-        return self._projection.locate(points_m, velocity_mps, times_s, from_s_m, to_s_m)
 
     def speed_limit(self, s_m: float) -> float:
         """The greatest speed at s_m, in m/s, at which every slower section and bend ahead can be met.

@@ -8,16 +8,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 
 from controller.path.path_pieces import EXTENSION_M, Piece
 from hal.compiled import compiled, inlined
-from hal.types import FloatArray
+from hal.types import FloatArray, Integers
 
 # s_m, x_m, y_m, heading_rad and curvature_1pm of the pieces at their beginnings, (P,) each.
-Chain = tuple[FloatArray, ...]
+Chain = Annotated[tuple[FloatArray, ...], "UniTuple(float64[::1], 5)"]
+Samples = Annotated[FloatArray, "float64[::1]"]
 
 _SAMPLE_M = 0.25
 _NEWTON_ROUNDS = 2
@@ -30,16 +31,24 @@ _MIN_RADIUS_SHARE = 0.05
 class Projection:
     """Projects points onto a path.
 
-    pieces: of the path; the first and the last are straight extensions. poses: function that returns x_m, y_m
-    and heading_rad (S,) of the path at s_m (S,).
+    chain: the pieces of the path; the first and the last are straight extensions.
+    straight_to: (P,) for each straight piece, index of the last one of the unbroken row of straight pieces
+        from it on.
+    sample_x, sample_y: (S,) points of the path, one every _SAMPLE_M.
     """
+
+    chain: Chain
+    straight_to: Integers
+    sample_x: Samples
+    sample_y: Samples
 
     def __init__(
         self,
         pieces: list[Piece],
         poses: Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray]],
     ) -> None:
-        self._chain: Chain = (
+        """poses: function that returns x_m, y_m and heading_rad (S,) of the path at s_m (S,)."""
+        self.chain = (
             np.array([piece.s_m for piece in pieces]),
             np.array([piece.x_m for piece in pieces]),
             np.array([piece.y_m for piece in pieces]),
@@ -47,16 +56,15 @@ class Projection:
             np.array([piece.curvature_1pm for piece in pieces]),
         )
         samples = np.arange(-EXTENSION_M, pieces[-1].s_m + EXTENSION_M + _SAMPLE_M, _SAMPLE_M)
-        self._sample_x, self._sample_y, _ = poses(samples)
-        # For each straight piece: index of the last one of the unbroken row of straight pieces from it on.
-        self._straight_to = np.arange(len(pieces))
+        self.sample_x, self.sample_y, _ = poses(samples)
+        self.straight_to = np.arange(len(pieces))
         for k in range(len(pieces) - 2, -1, -1):
             if pieces[k].curvature_1pm == 0.0 == pieces[k + 1].curvature_1pm:
-                self._straight_to[k] = self._straight_to[k + 1]
+                self.straight_to[k] = self.straight_to[k + 1]
 
     def project(self, x_m: float, y_m: float, low_m: float, high_m: float) -> tuple[float, float, float]:
         """s_m, d_m and the path's heading_rad of a point, searched from low_m to high_m along the path."""
-        return _project(self._chain, self._sample_x, self._sample_y, EXTENSION_M, x_m, y_m, low_m, high_m)
+        return _project(self, x_m, y_m, low_m, high_m)
 
     def locate(
         self,
@@ -70,25 +78,14 @@ class Projection:
 
         They move from points_m (N, 2) with constant velocity_mps (N, 2). Searched from from_s_m to to_s_m.
         """
-        return _locate(
-            self._chain,
-            self._straight_to,
-            self._sample_x,
-            self._sample_y,
-            EXTENSION_M,
-            points_m,
-            velocity_mps,
-            times_s,
-            from_s_m,
-            to_s_m,
-        )
+        return _locate(self, points_m, velocity_mps, times_s, from_s_m, to_s_m)
 
 
 @inlined
-def _samples_from_to(low_m: float, high_m: float, extension_m: float) -> tuple[int, int]:
+def _samples_from_to(low_m: float, high_m: float) -> tuple[int, int]:
     """Range of sample indices from low_m to high_m: the first, and one past the last; at least one sample."""
-    first = math.ceil((low_m + extension_m) / _SAMPLE_M)
-    return first, max(int((high_m + extension_m) / _SAMPLE_M), first) + 1
+    first = math.ceil((low_m + EXTENSION_M) / _SAMPLE_M)
+    return first, max(int((high_m + EXTENSION_M) / _SAMPLE_M), first) + 1
 
 
 @inlined
@@ -118,24 +115,16 @@ def _seen_from(chain: Chain, s_m: float, x_m: float, y_m: float) -> tuple[float,
 
 @inlined
 def _nearest(
-    chain: Chain,
-    sample_x: FloatArray,
-    sample_y: FloatArray,
-    first: int,
-    last: int,
-    x_m: float,
-    y_m: float,
-    low_m: float,
-    high_m: float,
+    path: Projection, first: int, last: int, x_m: float, y_m: float, low_m: float, high_m: float
 ) -> tuple[float, float, float]:
     """Path coordinates of a point, with s_m from low_m to high_m, and the path's heading there.
 
     Starts from the nearest sample of first..last (exclusive) and projects onto the circle that the path is
     there. That is exact on one piece; across the short pieces of a blend a second round is needed.
     """
-    nearest, least = first, math.inf
-    for k in range(first, min(last, len(sample_x))):
-        dx, dy = x_m - sample_x[k], y_m - sample_y[k]
+    chain, nearest, least = path.chain, first, math.inf
+    for k in range(first, min(last, len(path.sample_x))):
+        dx, dy = x_m - path.sample_x[k], y_m - path.sample_y[k]
         away = dx * dx + dy * dy
         if away < least:
             nearest, least = k, away
@@ -153,22 +142,13 @@ def _nearest(
     return s_m, math.copysign(math.hypot(ahead, left), left), heading
 
 
-@compiled(
-    "UniTuple(float64[::1], 5), float64[::1], float64[::1], float64, float64, float64, float64, float64"
-)
+@compiled(Projection, "float64, float64, float64, float64")
 def _project(
-    chain: Chain,
-    sample_x: FloatArray,
-    sample_y: FloatArray,
-    extension_m: float,
-    x_m: float,
-    y_m: float,
-    low_m: float,
-    high_m: float,
+    path: Projection, x_m: float, y_m: float, low_m: float, high_m: float
 ) -> tuple[float, float, float]:
-    """project() on a chain that is extended by extension_m at either end."""
-    first, last = _samples_from_to(low_m, high_m, extension_m)
-    return _nearest(chain, sample_x, sample_y, max(first, 0), last, x_m, y_m, low_m, high_m)
+    """As Projection.project()."""
+    first, last = _samples_from_to(low_m, high_m)
+    return _nearest(path, max(first, 0), last, x_m, y_m, low_m, high_m)
 
 
 @inlined
@@ -186,40 +166,45 @@ def _on_line(
     return s_m, math.copysign(math.hypot(along - s_m, left), left)
 
 
-@compiled(
-    "UniTuple(float64[::1], 5), int64[::1], float64[::1], float64[::1], float64,"
-    "float64[:, :], float64[:, :], float64[:], float64, float64"
-)
-def _locate(
-    chain: Chain,
-    straight_to: NDArray[np.int64],
-    sample_x: FloatArray,
-    sample_y: FloatArray,
-    extension_m: float,
+@inlined
+def located(
+    path: Projection,
     points_m: FloatArray,
     velocity_mps: FloatArray,
     times_s: FloatArray,
     from_s_m: float,
     to_s_m: float,
 ) -> FloatArray:
-    """locate() on a chain; straight_to (P,): up to which piece the path is straight from each piece on."""
-    starts, xs, ys, headings, bends = chain
-    end_m = starts[-1] + extension_m
-    low_m = min(max(from_s_m, -extension_m), end_m - _SAMPLE_M)
+    """As Projection.locate(), for compiled steps."""
+    starts, xs, ys, headings, bends = path.chain
+    end_m = starts[-1] + EXTENSION_M
+    low_m = min(max(from_s_m, -EXTENSION_M), end_m - _SAMPLE_M)
     high_m = min(max(to_s_m, low_m + _SAMPLE_M), end_m)
     piece = _piece_at(low_m, starts)
-    straight = bends[piece] == 0.0 and straight_to[piece] >= _piece_at(high_m, starts)
+    straight = bends[piece] == 0.0 and path.straight_to[piece] >= _piece_at(high_m, starts)
     heading = headings[piece]
     line = starts[piece], xs[piece], ys[piece], math.cos(heading), math.sin(heading)
-    first, last = _samples_from_to(low_m, high_m, extension_m)
-    located = np.empty((3, len(points_m), len(times_s)))
+    first, last = _samples_from_to(low_m, high_m)
+    result = np.empty((3, len(points_m), len(times_s)))
     for k in range(len(points_m)):
         for j in range(len(times_s)):
             x = points_m[k, 0] + velocity_mps[k, 0] * times_s[j]
             y = points_m[k, 1] + velocity_mps[k, 1] * times_s[j]
             if straight:
-                located[0, k, j], located[1, k, j] = _on_line(line, x, y, low_m, high_m)
-                located[2, k, j] = heading
+                result[0, k, j], result[1, k, j] = _on_line(line, x, y, low_m, high_m)
+                result[2, k, j] = heading
             else:
-                located[:, k, j] = _nearest(chain, sample_x, sample_y, first, last, x, y, low_m, high_m)
-    return located
+                result[:, k, j] = _nearest(path, first, last, x, y, low_m, high_m)
+    return result
+
+
+@compiled(Projection, "float64[:, :], float64[:, :], float64[:], float64, float64")
+def _locate(
+    path: Projection,
+    points_m: FloatArray,
+    velocity_mps: FloatArray,
+    times_s: FloatArray,
+    from_s_m: float,
+    to_s_m: float,
+) -> FloatArray:
+    return located(path, points_m, velocity_mps, times_s, from_s_m, to_s_m)

@@ -101,7 +101,7 @@ def test_moving_point_is_located_like_a_point_at_its_later_place() -> None:
     points, velocity = np.array([[2.0, 0.7], [4.0, 1.2]]), np.array([[0.2, 0.3], [0.5, -0.4]])
     times = np.array([0.0, 0.5, 2.0])
     for to_s_m in (3.5, 9.0):
-        s, d, heading = HOOK.locate(points, velocity, times, 0.0, to_s_m)
+        s, d, heading = HOOK.projection.locate(points, velocity, times, 0.0, to_s_m)
         assert s.shape == d.shape == heading.shape == (2, 3)
         for k, t_s in enumerate(times.tolist()):
             expected = HOOK.project_points(points + t_s * velocity, 0.0, to_s_m)
