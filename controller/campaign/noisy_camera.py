@@ -59,8 +59,7 @@ class NoisyCamera:
         """The scene of an exposure at t_s. odometry_pose: the robot's pose by odometry."""
         polygons, velocity = self._stage.world.snapshot(t_s)
         view = self.planar_camera.look(polygons, true_pose)
-        self._tracks.advance(velocity, t_s, self._random)
-        self._tracks.update(view, t_s, self._random)
+        self._tracks.step(view, velocity, t_s, self._random)
         return Scene(
             captured_ns=round(t_s * NS_PER_S),
             sequence=sequence,

@@ -30,7 +30,7 @@ _ERRORS, _COLUMNS = 13, 17
 
 
 class NoisyTracks:
-    """The tracks of N bodies. Once a frame: advance(), update(), obstacles()."""
+    """The tracks of N bodies. Once a frame: step(), then obstacles()."""
 
     def __init__(
         self,
@@ -54,33 +54,35 @@ class NoisyTracks:
         self._tracks[:, _HEIGHT] = high_m - low_m
         self._error_decay, self._velocity_gain = 0.0, -math.expm1(-self._period_s / noise.velocity_lag_s)
 
-    def advance(self, velocity_mps: FloatArray, t_s: float, random: np.random.Generator) -> None:
-        """Advance by one frame: errors change slowly, measured velocities follow the true ones (N, 2), and
-        bodies that are not seen keep their last measured velocity."""
-        new_errors = random.standard_normal((len(self._tracks), _COLUMNS - _ERRORS))
-        since_s, dt_s = t_s - _MAX_UNSEEN_FRAMES * self._period_s, self._period_s
-        decay, gain = self._error_decay, self._velocity_gain
-        self._tracks = _predicted(self._tracks, velocity_mps, new_errors, since_s, decay, gain, dt_s)
-        self._error_decay = math.exp(-self._period_s / self._noise.correlation_s)
+    def step(
+        self, view: PlanarView, velocity_mps: FloatArray, t_s: float, random: np.random.Generator
+    ) -> None:
+        """Predict the tracks by one frame, and update them with the bodies in it.
 
-    def update(self, view: PlanarView, t_s: float, random: np.random.Generator) -> None:
-        """Update the tracks with the bodies in this frame."""
-        draws = random.random(len(self._tracks))
-        self._tracks = _updated(
+        Errors change slowly, measured velocities follow the true ones (N, 2), and bodies that are not seen
+        keep their last measured velocity.
+        """
+        new_errors = random.standard_normal((len(self._tracks), _COLUMNS - _ERRORS))
+        self._tracks = _stepped(
             self._tracks,
             view,
             self._camera,
             self._noise,
+            velocity_mps,
             self._is_obstacle,
-            draws,
+            new_errors,
+            random.random(len(self._tracks)),
+            self._error_decay,
+            self._velocity_gain,
             self._min_depth_m,
             t_s,
             self._period_s,
         )
+        self._error_decay = math.exp(-self._period_s / self._noise.correlation_s)
 
     def obstacles(self, view: PlanarView, t_s: float) -> tuple[Obstacle, ...]:
         """The obstacles as perception reports them for this view."""
-        reported, vectors, covariances = _reported(
+        reported, vectors = _reported(
             self._tracks, self._centre_height_m, self._to_optical, view.camera_pose, t_s, self._noise
         )
         return tuple(
@@ -88,23 +90,25 @@ class NoisyTracks:
                 Obstacle(
                     id=int(track_id),
                     bbox_px=_BOX_PX,
-                    position_m=vectors[k, 0],
-                    extent_m=vectors[k, 1],
-                    velocity_mps=vectors[k, 2],
-                    velocity_cov=covariances[k],
+                    position_m=measured[0],
+                    extent_m=measured[1],
+                    velocity_mps=measured[2],
+                    velocity_cov=measured[3:],
                     moving=moving > 0.0,
                     score=0.9 if moving > 0.0 else 0.5,
                     fragments=8,
                     age_s=age_s,
                     unseen_s=unseen_s,
                 )
-                for k, (track_id, moving, age_s, unseen_s) in enumerate(reported.tolist())
+                for measured, (track_id, moving, age_s, unseen_s) in zip(
+                    vectors, reported.tolist(), strict=True
+                )
             ]
         )
 
 
-@compiled("float64[:, ::1], float64[:, ::1], float64[:, ::1], float64, float64, float64, float64")
-def _predicted(
+@inlined
+def _predict(
     tracks: FloatArray,
     velocity_mps: FloatArray,
     new_errors: FloatArray,
@@ -112,11 +116,10 @@ def _predicted(
     decay: float,
     velocity_gain: float,
     dt_s: float,
-) -> FloatArray:
+) -> None:
     """Predict the tracks (N, C) by dt_s. decay: ratio of the old errors that stays; new_errors: (N, 4).
     velocity_gain: low-pass gain with which the measured velocities of bodies seen since seen_since_s approach
     the true ones (N, 2)."""
-    tracks = tracks.copy()
     innovation = math.sqrt(1.0 - decay * decay)
     for k in range(len(tracks)):
         track = tracks[k]
@@ -127,7 +130,6 @@ def _predicted(
         track[_Y] += track[_VY] * dt_s
         for j in range(new_errors.shape[1]):
             track[_ERRORS + j] = decay * track[_ERRORS + j] + innovation * new_errors[k, j]
-    return tracks
 
 
 @inlined
@@ -162,25 +164,32 @@ def _update_motion(track: FloatArray, fast: bool, dt_s: float, noise: NoiseModel
     PlanarView,
     PlanarCamera,
     NoiseModel,
-    "boolean[::1], float64[::1], float64, float64, float64",
+    "float64[:, ::1], boolean[::1], float64[:, ::1], float64[::1],"
+    "float64, float64, float64, float64, float64",
 )
-def _updated(
+def _stepped(
     tracks: FloatArray,
     view: PlanarView,
     camera: PlanarCamera,
     noise: NoiseModel,
+    velocity_mps: FloatArray,
     is_obstacle: BoolArray,
+    new_errors: FloatArray,
     draws: FloatArray,
+    decay: float,
+    velocity_gain: float,
     min_depth_m: float,
     t_s: float,
     dt_s: float,
 ) -> FloatArray:
-    """The tracks (N, C) after a frame with this view.
+    """The tracks (N, C) after a frame with this view. velocity_mps, new_errors, decay and velocity_gain: as
+    for _predict().
 
     A body is missed if its random draw (N,) in 0..1 is less than the miss rate at its distance.
     """
     camera_x, camera_y, cos, sin = view.camera_pose
     tracks = tracks.copy()
+    _predict(tracks, velocity_mps, new_errors, t_s - _MAX_UNSEEN_FRAMES * dt_s, decay, velocity_gain, dt_s)
     last_id = tracks[:, _ID].max() if len(tracks) else 0.0
     for row in range(len(view.bodies)):
         body = view.bodies[row]
@@ -219,13 +228,13 @@ def _reported(
     eye: Eye,
     t_s: float,
     noise: NoiseModel,
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+) -> tuple[FloatArray, FloatArray]:
     """The R bodies that are reported: id, whether it moves, times since its first and last sighting (R, 4);
-    position, extent and velocity in optical axes (R, 3, 3); covariance of the velocity (R, 3, 3)."""
+    position, extent, velocity and the three rows of its covariance, in optical axes (R, 6, 3)."""
     camera_x, camera_y, cos, sin = eye
     depth_sigma_1pm = noise.tracked_depth_ratio * noise.depth_sigma_1pm
     count, found = len(tracks), 0
-    reported, vectors, covariances = np.empty((count, 4)), np.empty((count, 3, 3)), np.empty((count, 3, 3))
+    reported, vectors = np.empty((count, 4)), np.empty((count, 6, 3))
     for k in range(count):
         track = tracks[k]
         errors = track[_ERRORS:]
@@ -243,7 +252,8 @@ def _reported(
         radial, lateral = (radial + initial) ** 2, (lateral + initial) ** 2
         vertical = (_VERTICAL_SIGMA_MPS + initial) ** 2
         reported[found] = track[_ID], track[_MOVING], t_s - track[_FIRST_S], t_s - track[_SEEN_S]
-        position, extent, velocity = vectors[found]
+        position, extent, velocity = vectors[found, :3]
+        covariance = vectors[found, 3:]
         for i in range(3):
             axis_i = to_optical[i]
             position[i] = seen_ahead * axis_i[0] + seen_left * axis_i[1] + centre_height_m[k] * axis_i[2]
@@ -251,10 +261,10 @@ def _reported(
             velocity[i] = away_mps * axis_i[0] + left_mps * axis_i[1]
             for j in range(3):
                 axis_j = to_optical[j]
-                covariances[found, i, j] = (
+                covariance[i, j] = (
                     axis_i[0] * radial * axis_j[0]
                     + axis_i[1] * lateral * axis_j[1]
                     + axis_i[2] * vertical * axis_j[2]
                 )
         found += 1
-    return reported[:found], vectors[:found], covariances[:found]
+    return reported[:found], vectors[:found]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import TYPICAL_DEPTH_NOISE, DepthNoise
-from controller.decision.bodies import Bodies
+from controller.decision.bodies import Bodies, covering
 from controller.decision.situation import SceneError
 from hal.compiled import compiled, inlined
 from hal.records import record
@@ -50,8 +50,7 @@ class Surfaces:
 
     def of(self, bodies: Bodies) -> NDArray[np.bool_]:
         """(P, N) which points belong to which bodies. Along the view the tolerance grows with depth noise."""
-        reach_m = _reach_m(self.forward_m, _DEPTH_SIGMAS * self.noise.quadratic_per_m)
-        return bodies.covers(self.points_m, reach_m, AROUND_M)
+        return _belongs(bodies, self.points_m, self.forward_m, _DEPTH_SIGMAS * self.noise.quadratic_per_m)
 
 
 NO_SURFACES = Surfaces(np.zeros(0), np.zeros(0, np.intp), np.zeros(0), np.zeros(0), np.zeros((0, 2)))
@@ -191,10 +190,12 @@ def _impossible(
     return -1, -1
 
 
-@compiled("float64[:], float64")
-def _reach_m(forward_m: FloatArray, off_per_m: float) -> FloatArray:
-    """(P,) maximum distance along the view between a point and a body that it belongs to."""
-    return AROUND_M + off_per_m * forward_m * forward_m
+@compiled(Bodies, "float64[:, :], float64[:], float64")
+def _belongs(
+    bodies: Bodies, points_m: FloatArray, forward_m: FloatArray, off_per_m: float
+) -> NDArray[np.bool_]:
+    """(P, N) as Surfaces.of(). off_per_m: growth of the depth noise with the square of forward_m."""
+    return covering(bodies, points_m, AROUND_M + off_per_m * forward_m * forward_m, AROUND_M)
 
 
 @compiled("float64[:], float64, float64[:], float64[:], UniTuple(float64, 4)")

@@ -63,6 +63,7 @@ def significant_component(velocity_mps: FloatArray, covariance: FloatArray, alon
     return part_mps if abs(part_mps) > math.sqrt(float(along @ covariance @ along)) else 0.0
 
 
+@compiled(Bodies, PlanarPose)
 def may_enter_way(bodies: Bodies, pose: PlanarPose) -> BoolArray:
     """(N,) which bodies may come into the robot's way.
 
@@ -70,10 +71,12 @@ def may_enter_way(bodies: Bodies, pose: PlanarPose) -> BoolArray:
     _ALONG_TO_OUTWARD_RATIO times as fast forward as outwards), from where one may cut in.
     """
     cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
-    left = (bodies.xy_m[:, 1] - pose.y_m) * cos - (bodies.xy_m[:, 0] - pose.x_m) * sin
-    leftward = bodies.velocity_mps[:, 1] * cos - bodies.velocity_mps[:, 0] * sin
-    forward = bodies.velocity_mps[:, 0] * cos + bodies.velocity_mps[:, 1] * sin
-    comes: BoolArray = (left * leftward < 0.0) | (forward > _ALONG_TO_OUTWARD_RATIO * np.abs(leftward))
+    comes = np.empty(len(bodies.xy_m), np.bool_)
+    for k in range(len(comes)):
+        vx, vy = bodies.velocity_mps[k]
+        left = (bodies.xy_m[k, 1] - pose.y_m) * cos - (bodies.xy_m[k, 0] - pose.x_m) * sin
+        leftward, forward = vy * cos - vx * sin, vx * cos + vy * sin
+        comes[k] = left * leftward < 0.0 or forward > _ALONG_TO_OUTWARD_RATIO * abs(leftward)
     return comes
 
 
@@ -86,8 +89,7 @@ def with_measured_velocity(bodies: Bodies, mistaken_mps: float) -> Bodies:
     _SURE_MOVE_SIGMAS and _APPROACH_MIN_MPS. A speed above mistaken_mps is an error of measurement and is not
     used.
     """
-    goes = _before_verdict(bodies) & _faster_than(bodies, _SURE_MOVE_SIGMAS)
-    goes &= np.hypot(bodies.measured_mps[:, 0], bodies.measured_mps[:, 1]) <= mistaken_mps
+    goes = _moves_before_verdict(bodies, _SURE_MOVE_SIGMAS, mistaken_mps)
     if not np.count_nonzero(goes):
         return bodies
     velocity = np.where(goes[:, None], bodies.measured_mps, bodies.velocity_mps)
@@ -96,34 +98,45 @@ def with_measured_velocity(bodies: Bodies, mistaken_mps: float) -> Bodies:
 
 def hardly_stood(bodies: Bodies) -> BoolArray:
     """(N,) which bodies were judged standing before a verdict can be trusted, and measured as moving."""
-    return _before_verdict(bodies) & _faster_than(bodies, _APPROACH_MIN_SIGMAS)
+    return _moves_before_verdict(bodies, _APPROACH_MIN_SIGMAS, math.inf)
 
 
+@compiled(Bodies, Bodies)
 def velocities_agree(bodies: Bodies, seen: Bodies) -> BoolArray:
     """(N, M) whether the measured velocity of each of M seen bodies agrees with that of each of these N.
 
     A seen body that was tracked for MIN_TRACKED_S or less agrees with none: its velocity is hardly known and
     would fit any body.
     """
-    spread = np.diagonal(bodies.covariance, axis1=1, axis2=2)[:, None]
-    seen_spread = np.diagonal(seen.covariance, axis1=1, axis2=2)
-    differs = bodies.velocity_mps[:, None] - seen.measured_mps
-    same = np.all(differs**2 <= _SAME_VELOCITY_SIGMAS**2 * (spread + seen_spread), axis=2)
-    return np.asarray(same & (seen.tracked_s > MIN_TRACKED_S))
+    agree = np.empty((len(bodies.velocity_mps), len(seen.measured_mps)), np.bool_)
+    for k in range(agree.shape[0]):
+        for m in range(agree.shape[1]):
+            agree[k, m] = seen.tracked_s[m] > MIN_TRACKED_S
+            for axis in range(2):
+                differs = bodies.velocity_mps[k, axis] - seen.measured_mps[m, axis]
+                spread = bodies.covariance[k, axis, axis] + seen.covariance[m, axis, axis]
+                agree[k, m] &= differs**2 <= _SAME_VELOCITY_SIGMAS**2 * spread
+    return agree
 
 
-def _before_verdict(bodies: Bodies) -> BoolArray:
-    """(N,) which bodies are judged standing, tracked for MIN_TRACKED_S to _VERDICT_TRUSTED_S only."""
-    told = (bodies.tracked_s >= MIN_TRACKED_S) & (bodies.tracked_s < _VERDICT_TRUSTED_S)
-    return np.asarray(~bodies.moving & told)
+@compiled(Bodies, "float64, float64")
+def _moves_before_verdict(bodies: Bodies, sigmas: float, max_mps: float) -> BoolArray:
+    """(N,) which bodies are judged standing and tracked for MIN_TRACKED_S to _VERDICT_TRUSTED_S only, but
+    were measured as moving.
 
-
-def _faster_than(bodies: Bodies, sigmas: float) -> BoolArray:
-    """(N,) whose measured speed is above this many standard deviations, and above _APPROACH_MIN_MPS."""
-    squared = np.einsum("ni,ni->n", bodies.measured_mps, bodies.measured_mps)
-    # The variance of the speed along the velocity's own direction is v' C v / v'v; this is v' C v.
-    variance = np.einsum("ni,nij,nj->n", bodies.measured_mps, bodies.covariance, bodies.measured_mps)
-    return np.asarray((squared**2 > sigmas**2 * variance) & (squared > _APPROACH_MIN_MPS**2))
+    Their speed is above this many standard deviations, above _APPROACH_MIN_MPS, and at most max_mps.
+    """
+    moves = np.zeros(len(bodies.moving), np.bool_)
+    for k in range(len(moves)):
+        if bodies.moving[k] or not MIN_TRACKED_S <= bodies.tracked_s[k] < _VERDICT_TRUSTED_S:
+            continue
+        (x, y), spread = bodies.measured_mps[k], bodies.covariance[k]
+        squared = x * x + y * y
+        # The variance of the speed along the velocity's own direction is v' C v / v'v; this is v' C v.
+        variance = x * spread[0, 0] * x + x * (spread[0, 1] + spread[1, 0]) * y + y * spread[1, 1] * y
+        fast = squared**2 > sigmas**2 * variance and squared > _APPROACH_MIN_MPS**2
+        moves[k] = fast and math.hypot(x, y) <= max_mps
+    return moves
 
 
 @compiled(Bodies, "float64[:]", PlanarPose)

@@ -14,6 +14,7 @@ import numpy as np
 from controller.decision.bodies import Bodies
 from controller.decision.unseen_motion import significant_component
 from controller.decision.view_edges import ViewEdges, beyond_edges
+from hal.compiled import compiled
 from hal.types import CameraMount, FloatArray, PlanarPose
 from vision.scene import FreeSpace
 
@@ -26,6 +27,7 @@ _VELOCITY_CHANGE_MPS2 = 0.25
 _ROUNDING = 1e-6
 
 
+@compiled(Bodies, "float64", PlanarPose, CameraMount)
 def extrapolated(bodies: Bodies, dt_s: float, pose: PlanarPose, mount: CameraMount) -> FloatArray:
     """(N, 2) the positions dt_s later at constant velocity.
 
@@ -33,17 +35,20 @@ def extrapolated(bodies: Bodies, dt_s: float, pose: PlanarPose, mount: CameraMou
     sideways velocity) stays at least _MIN_AXIS_DISTANCE_M on its own side: had it crossed, it would have
     been seen.
     """
-    way = bodies.velocity_mps * dt_s
-    forward = np.array([math.cos(pose.heading_rad), math.sin(pose.heading_rad)])
-    leftward = np.array([-forward[1], forward[0]])
-    offset = bodies.xy_m - (pose.x_m, pose.y_m)
-    left = offset @ leftward - mount.left_m
-    side = np.where(left < 0.0, -1.0, 1.0)
-    ahead = offset @ forward - mount.forward_m - bodies.half_view_m > 0.0
-    sigma_mps = np.sqrt(leftward @ bodies.covariance @ leftward)
-    comes = bodies.moving & ahead & (-side * (bodies.velocity_mps @ leftward) > sigma_mps)
-    past_m = np.where(comes, np.maximum(_MIN_AXIS_DISTANCE_M - side * (left + way @ leftward), 0.0), 0.0)
-    xy: FloatArray = bodies.xy_m + way + (side * past_m)[:, None] * leftward
+    cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
+    xy = np.empty(bodies.xy_m.shape)
+    for k in range(len(xy)):
+        (vx, vy), spread = bodies.velocity_mps[k], bodies.covariance[k]
+        dx, dy = bodies.xy_m[k, 0] - pose.x_m, bodies.xy_m[k, 1] - pose.y_m
+        left, leftward_mps = dy * cos - dx * sin - mount.left_m, vy * cos - vx * sin
+        side = -1.0 if left < 0.0 else 1.0
+        ahead = dx * cos + dy * sin - mount.forward_m - bodies.half_view_m[k] > 0.0
+        variance = (spread[0, 0] * sin - (spread[0, 1] + spread[1, 0]) * cos) * sin + spread[1, 1] * cos * cos
+        past_m = 0.0
+        if bodies.moving[k] and ahead and -side * leftward_mps > math.sqrt(variance):
+            past_m = max(_MIN_AXIS_DISTANCE_M - side * (left + leftward_mps * dt_s), 0.0)
+        xy[k, 0] = bodies.xy_m[k, 0] + vx * dt_s - side * past_m * sin
+        xy[k, 1] = bodies.xy_m[k, 1] + vy * dt_s + side * past_m * cos
     return xy
 
 

@@ -215,7 +215,8 @@ class WorldModel:
         while len(self._places) > 1 and self._places[1][0] <= bodies.captured_ns - _BEFORE_NS:
             self._places.popleft()
         new = bodies.age_s < MIN_TRACKED_S
-        self._renumbered.intersection_update(bodies.ids.tolist())
+        if self._renumbered:
+            self._renumbered.intersection_update(bodies.ids.tolist())
         if not self._places or not np.count_nonzero(new):
             return bodies
         captured_ns, points = self._places[0]
