@@ -72,12 +72,14 @@ def pushed_out_of_view(
     offset = bodies.xy_m - (pose.x_m, pose.y_m)
     ahead, left = offset @ forward - mount.forward_m, offset @ leftward - mount.left_m
     near, far = ahead - bodies.half_view_m, ahead + bodies.half_view_m
-    within = ~beyond_edges(bodies, near, mount.height_m, edges)
+    within = bodies.moving & (near > 0.0) & ~beyond_edges(bodies, near, mount.height_m, edges)
+    if not np.count_nonzero(within):
+        return bodies
     side = np.where(left < 0.0, -1.0, 1.0)
     inner = side * left - bodies.half_across_m
     xy, velocity = bodies.xy_m.copy(), bodies.velocity_mps.copy()
     covariance, unseen_s = bodies.covariance.copy(), bodies.unseen_s.copy()
-    for k in np.flatnonzero(bodies.moving & within & (near > 0.0)).tolist():
+    for k in within.nonzero()[0].tolist():
         from_tan = float(min(inner[k] / near[k], inner[k] / far[k]))
         outside_m = _seen_through_tan(free, float(side[k]), from_tan, float(far[k])) * far[k]
         push_out_m = outside_m - inner[k]
