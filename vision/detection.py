@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from hal.types import Intrinsics, Pose
 from vision.camera.health import worsened
 from vision.depth.depth_grid import DepthGrid
-from vision.ego_motion.camera_motion import MIN_AGREEMENT
 from vision.motion.velocities import EndResiduals
 from vision.scene import CameraCondition, CameraHealth, EgoMotion
 
@@ -45,6 +44,7 @@ class Detection:
     restarted: the fixed frame has begun anew, so earlier positions cannot be compared.
     motion_known: the camera's own motion is known well enough to call anything else moving.
     reckoned: odometry supports that motion.
+    blurred: few fragments fit one motion of the camera under the assumed noise; never with odometry.
     """
 
     captured_ns: int
@@ -63,11 +63,7 @@ class Detection:
     restarted: bool
     motion_known: bool
     reckoned: bool
-
-    @property
-    def blurred(self) -> bool:
-        """Whether few fragments fit one motion of the camera under the assumed noise; never with odometry."""
-        return not self.reckoned and self.ego_motion.inlier_ratio < MIN_AGREEMENT
+    blurred: bool
 
 
 def camera_health(health: CameraHealth, ego: EgoMotion, blurred: bool, reckoned: bool) -> CameraHealth:

@@ -133,6 +133,7 @@ class Detector:
             dt_s=dt_s,
             motion_known=ego.source in ("visual", "odometry") and (found.noisy or not blurred),
             reckoned=reckoned,
+            blurred=blurred,
         )
         # A look at a body takes the place of a renewal, but never twice in a row.
         looked = previous is not None and self._look_closer(frame, grey, previous.needs_fragments)
@@ -261,6 +262,7 @@ class Detector:
         restarted: bool = False,
         motion_known: bool = False,
         reckoned: bool = False,
+        blurred: bool = False,
     ) -> Detection:
         store, self._last_health = self._store, health
         return Detection(
@@ -280,6 +282,7 @@ class Detector:
             restarted=restarted,
             motion_known=motion_known,
             reckoned=reckoned,
+            blurred=blurred,
         )
 
 

@@ -42,7 +42,6 @@ from vision.fragments.attention import bodies_needing_fragments
 from vision.motion import least_squares, limbs
 from vision.motion.least_squares import FragmentVelocities
 from vision.motion.motion_evidence import evidence_of
-from vision.numerics import kalman
 from vision.percept import Percept
 from vision.scene import CameraCondition, FreeSpace, Scene
 
@@ -241,9 +240,7 @@ class Tracker:
                 lag_s / detection.dt_s,
                 rotation,
             )
-            tracks.state[use], tracks.covariance[use] = kalman.update(
-                tracks.state.take(use, axis=0), tracks.covariance.take(use, axis=0), velocity, noise, 3
-            )
+            tracks.update_with_fragments(use, velocity, noise)
         tracks.restless_s = _sustained(tracks.restless_s, limbs.restless(body), detection.dt_s)
         tracks.arriving_s = _sustained(tracks.arriving_s, arriving(arrivals, cells), detection.dt_s)
         tracks.rim_s = rim_motion.one_way_s(tracks.rim_s, rims, settings.sigmas, detection.dt_s)

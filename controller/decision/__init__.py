@@ -8,6 +8,7 @@ The files in the order of one control step:
 * obstacle_boxes.py - makes boxes on the floor of the obstacles
 * bodies.py - these boxes, as arrays
 * surfaces.py - the free space as points on the floor
+* known_places.py - which new tracks began where something had stood: no newcomers
 * velocity_filter.py - averages the measured velocities; how fast those who set off may become
 * out_of_view.py - keeps bodies that have left the view
 * unseen_motion.py - which of them move, and with which velocity

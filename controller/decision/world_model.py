@@ -1,7 +1,8 @@
 """What the decision knows of the way ahead: the last good scene, and the bodies out of view since then.
 
 For each new scene, WorldModel turns the obstacles into boxes (controller/decision/obstacle_boxes.py),
-averages their velocities (controller/decision/velocity_filter.py), adds bodies that have left the view
+tells newcomers from tracks that were merely renumbered (controller/decision/known_places.py), averages their
+velocities (controller/decision/velocity_filter.py), adds bodies that have left the view
 (controller/decision/out_of_view.py), and notes free floor and unexplained surfaces along the path
 (controller/decision/sight.py). In each control step it says whether the camera can be relied on (the field
 fault). controller/decision/speed_limits.py turns what is known into speed limits.
@@ -10,8 +11,6 @@ fault). controller/decision/speed_limits.py turns what is known into speed limit
 from __future__ import annotations
 
 import math
-from collections import deque
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +18,9 @@ from numpy.typing import NDArray
 from config.decision import DecisionConfig
 from config.perception import TYPICAL_DEPTH_NOISE, DepthNoise
 from config.robot import Robot
-from controller.decision.bodies import Bodies, covering, no_bodies
+from controller.decision.bodies import Bodies, no_bodies
 from controller.decision.corridor import Corridor
+from controller.decision.known_places import KnownPlaces
 from controller.decision.lens_cover import LensCover
 from controller.decision.limits import STANDING_MPS
 from controller.decision.obstacle_boxes import bodies_of
@@ -28,7 +28,6 @@ from controller.decision.out_of_view import OutOfView
 from controller.decision.sight import Sight
 from controller.decision.situation import SceneError
 from controller.decision.surfaces import NO_SURFACES, check_scan, surfaces_of
-from controller.decision.unseen_motion import MIN_TRACKED_S
 from controller.decision.velocity_filter import SteadyVelocities
 from controller.decision.view_edges import ViewEdges
 from controller.localise import PoseHistory
@@ -44,9 +43,6 @@ _MAX_BOX_HALF_M = 0.8
 # Half width up to which a standing body is no box but a strip: along a rack there are dozens of strips a
 # centimetre or two wide, different ones in each frame. Poles are wider.
 _MIN_BOX_HALF_WIDTH_M = 0.015
-# A new track is no newcomer if something stood within this distance of its place, this long before.
-_BEFORE_NS = 200_000_000
-_SAME_PLACE_M = 0.25
 _FUTURE_S = 0.005  # tolerance of the scene's time stamp
 _GOOD = CameraHealth(CameraCondition.GOOD, "", float("nan"))
 
@@ -94,9 +90,7 @@ class WorldModel:
         self._velocity_filter = SteadyVelocities()
         self._out_of_view = OutOfView(mount, robot.limits.max_obstacle_speed_mps)
         self.edges = ViewEdges(edge_tan=0.5, near_m=config.sight.near_m, up_tan=math.inf)
-        # Of the last scenes: capture time, and points where something stood (K, 2).
-        self._places: deque[tuple[int, FloatArray]] = deque()
-        self._renumbered: set[int] = set()  # ids of tracks that began where something had stood
+        self._known_places = KnownPlaces()
         self._captured_ns: int | None = None
         self._scene_fault = ""
 
@@ -113,12 +107,8 @@ class WorldModel:
         """Take over what does not depend on the path: bodies, velocities, surfaces, the camera's state."""
         self.bodies, self._boxes = before.bodies, before._boxes
         self._seen, self._boxed, self._unboxed = before._seen, before._boxed, before._unboxed
-        self._velocity_filter, self._out_of_view, self._places = (
-            before._velocity_filter,
-            before._out_of_view,
-            before._places,
-        )
-        self._renumbered = before._renumbered
+        self._velocity_filter, self._out_of_view = before._velocity_filter, before._out_of_view
+        self._known_places = before._known_places
         self._poses, self.surfaces, self.lens = before._poses, before.surfaces, before.lens
         self.health, self.edges = before.health, before.edges
         self._captured_ns, self._scene_fault = before._captured_ns, before._scene_fault
@@ -187,7 +177,8 @@ class WorldModel:
         boxed = _boxed(seen.half_view_m, seen.half_across_m, seen.moving)
         self.edges = edges = self._edges_of(free)
         self.surfaces = surfaces = surfaces_of(free, pose, self._mount, self._noise)
-        boxes = self._velocity_filter.update(self._age_known_places(seen.select(boxed)))
+        boxes = self._known_places.without_newcomers(seen.select(boxed), seen.ids)
+        boxes = self._velocity_filter.update(boxes)
         boxes = self._out_of_view.mark_leaving_movers(boxes, pose, edges)
         standing = v_mps <= STANDING_MPS
         remembered = self._out_of_view.update(self._boxes, boxes, pose, edges, standing, free)
@@ -195,7 +186,7 @@ class WorldModel:
         self._boxes, self._seen, self._boxed, self._unboxed = boxes, seen, boxed, None
         self.lens.look(free, self.corridor.half_width_at(s_m), self._mount.left_m)
         self.sight.look(free, surfaces, pose, s_m, scene.captured_ns, boxes, standing)
-        self._places.append((scene.captured_ns, _standing_places(surfaces.points_m, seen)))
+        self._known_places.remember(scene.captured_ns, surfaces.points_m, seen)
         self.health = scene.health
         self._captured_ns = scene.captured_ns
         return ""
@@ -206,47 +197,6 @@ class WorldModel:
         if len(free.bearing_tan):
             edge_tan = _outermost(free.bearing_tan) + free.half_width_tan
         return ViewEdges(edge_tan, max(self._config.sight.near_m, free.floor_from_m), free.up_tan)
-
-    def _age_known_places(self, bodies: Bodies) -> Bodies:
-        """The bodies, where a new track is no newcomer if something stood in its place before it began.
-
-        Its age_s is raised to MIN_TRACKED_S, whatever its new number; its tracked_s stays.
-        """
-        while len(self._places) > 1 and self._places[1][0] <= bodies.captured_ns - _BEFORE_NS:
-            self._places.popleft()
-        new = bodies.age_s < MIN_TRACKED_S
-        if self._renumbered:
-            self._renumbered.intersection_update(bodies.ids.tolist())
-        if not self._places or not np.count_nonzero(new):
-            return bodies
-        captured_ns, points = self._places[0]
-        if captured_ns <= bodies.captured_ns - _BEFORE_NS:
-            # Later on, it would be its own surface that was there before.
-            new &= bodies.tracked_s * NS_PER_S < bodies.captured_ns - captured_ns
-            there = bodies.covers(points, np.full(len(points), _SAME_PLACE_M), _SAME_PLACE_M).any(axis=0)
-            self._renumbered.update(bodies.ids[new & there].tolist())
-        if not self._renumbered:
-            return bodies
-        known = np.array([one in self._renumbered for one in bodies.ids.tolist()])
-        return replace(bodies, age_s=np.where(known, np.maximum(bodies.age_s, MIN_TRACKED_S), bodies.age_s))
-
-
-@compiled("float64[:, :]", Bodies)
-def _standing_places(points_m: FloatArray, seen: Bodies) -> FloatArray:
-    """(K, 2) the points of surfaces (P, 2) and the centres of seen, without those of movers.
-
-    A new track where a mover has just been is a part of him. Taken for something that has long stood there,
-    an arm right before the camera would be waited for without end.
-    """
-    places = np.concatenate((points_m, seen.xy_m))
-    of_body = covering(seen, places, np.full(len(places), _SAME_PLACE_M), _SAME_PLACE_M)
-    stands = np.ones(len(places), np.bool_)
-    for k in range(len(seen.moving)):
-        if seen.moving[k]:
-            stands[len(points_m) + k] = False
-            for i in range(len(places)):
-                stands[i] &= not of_body[i, k]
-    return places[stands]
 
 
 @compiled("float64[:], float64[:], boolean[:]")

@@ -63,6 +63,7 @@ def detection(
         restarted=first,
         motion_known=motion_known and not first,
         reckoned=True,
+        blurred=False,
     )
 
 

@@ -91,3 +91,8 @@ def by_surface(velocity: Speed, velocity_measured_s: float, **changes: Any) -> M
         velocity,
         **{**surface(velocity, SURE), "velocity_measured_s": np.array([velocity_measured_s]), **changes},
     )
+
+
+def by_rim(rim_mps: float = 0.8, rim_s: float = 0.15, **changes: Any) -> MotionEvidence:
+    """A half hidden body: nothing but its free rims tells that it goes."""
+    return one(ACROSS, **{"rim_mps": np.array([rim_mps]), "rim_s": np.array([rim_s]), **changes})

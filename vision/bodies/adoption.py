@@ -17,6 +17,7 @@ from vision.depth.depth_grid import DepthGrid, nearest_cell
 from vision.depth.depth_noise import depth_sigma_of
 from vision.detection import Detection
 from vision.motion.candidates import long_static
+from vision.numerics.order import index_of
 
 # Places where the label of a fragment's body is looked up: at these shares of its length; three of them above
 # it, since the cells of a lower edge are those of the floor; the last two beside it, since an outline lies on
@@ -47,11 +48,8 @@ def _inherited(
 ) -> NDArray[np.int64]:
     result = np.full(len(ids), -1, np.int64)
     for k in range(len(ids)):
-        place = np.searchsorted(known, ids[k])
-        if place == len(known) or known[place] != ids[k]:
-            continue
-        track = np.searchsorted(tracks, owner[place])
-        if track < len(tracks) and tracks[track] == owner[place]:
+        place = index_of(known, ids[k])
+        if place >= 0 and index_of(tracks, owner[place]) >= 0:
             result[k] = owner[place]
     return result
 

@@ -22,7 +22,6 @@ from vision.bodies.tracks import Tracks
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import DepthGrid
 from vision.depth.rims import NO_RIM, FreeRims, free_rims
-from vision.numerics import kalman
 from vision.numerics.relative_pose import NEAREST_M, Row, coordinate_m, relative_row
 
 # Rims are compared over 0.2 s, rounded to frames: a walking person moves by 0.2 m, five times the width of a
@@ -267,13 +266,4 @@ def fuse(tracks: Tracks, rims: RimVelocities, dt_s: float) -> None:
     along = direction[:, :, None] * direction[:, None, :]
     noise = _UNKNOWN_MPS**2 * (np.eye(3) - along) + variance[:, None, None] * along
     velocity = rims.mps[use, None] * direction
-    tracks.state[use], tracks.covariance[use] = kalman.update(
-        tracks.state.take(use, axis=0), tracks.covariance.take(use, axis=0), velocity, noise, 3
-    )
-    tracks.surface_state[use], tracks.surface_covariance[use] = kalman.update(
-        tracks.surface_state.take(use, axis=0),
-        tracks.surface_covariance.take(use, axis=0),
-        velocity,
-        noise,
-        3,
-    )
+    tracks.update_with_rims(use, velocity, noise)

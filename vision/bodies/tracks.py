@@ -7,6 +7,7 @@ velocities and vision/bodies/judgement.py update them.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from typing import Any
 
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from hal.compiled import compiled
 from hal.types import Flags, FloatArray, Integers, Matrices, Matrix, Vector
 from vision.numerics import kalman
+from vision.numerics.order import indices_of
 
 _TRAIL_S = 0.3  # time constant of the trailing average of a centre: several frames, less than a step lasts
 # A track really advances if its centre advances at this share of the filtered velocity at least. The centre
@@ -23,6 +25,8 @@ _TRAIL_S = 0.3  # time constant of the trailing average of a centre: several fra
 _MIN_ADVANCE_SHARE = 0.4
 _UNPROVEN_S = 0.05  # a frame or two: for that long proof may be missing by chance
 _LEFT_SHARE = 0.6  # of its width: a track displaced by more has clearly left its former place
+
+_Estimates = tuple[FloatArray, FloatArray]  # states (K, 6) and covariances (K, 6, 6)
 
 
 def _column(kind: type, *shape: int) -> Any:
@@ -108,7 +112,7 @@ class Tracks:
 
     def index_of(self, ids: NDArray[np.int64]) -> NDArray[np.intp]:
         """(N,) index of each track id; -1 where there is no such track, or no longer."""
-        return _indices(self.ids, ids)
+        return indices_of(self.ids, ids)
 
     def start(
         self, position_m: FloatArray, sigma_m: float, max_speed_mps: float, evidence: float, now_ns: int
@@ -192,51 +196,41 @@ class Tracks:
         self.nearly_hidden |= chosen
         self.cells[chosen] = 0
 
-    def update_with_centre(self, index: NDArray[np.intp], position_m: FloatArray, noise: FloatArray) -> None:
+    def update_with_centre(self, index: Integers, position_m: FloatArray, noise: FloatArray) -> None:
         """Update both filters of tracks index (K,) with measured centres.
 
         position_m (K, 3): in the fixed frame. noise (K, 3, 3): their covariance.
         """
-        if len(index) == 0:
-            return
+        self._apply(kalman.update, index, position_m, noise, kalman.POSITION)
+
+    def reset_position(self, index: Integers, position_m: FloatArray, noise: FloatArray) -> None:
+        """As update_with_centre, but the centre tells nothing about the velocity."""
+        self._apply(kalman.reset_position, index, position_m, noise)
+
+    def update_with_rims(self, index: Integers, velocity_mps: FloatArray, noise: FloatArray) -> None:
+        """Update both filters of tracks index (K,) with velocities (K, 3), noise (K, 3, 3), of their rims."""
+        self._apply(kalman.update, index, velocity_mps, noise, kalman.VELOCITY)
+
+    def update_with_fragments(self, index: Integers, velocity_mps: FloatArray, noise: FloatArray) -> None:
+        """As update_with_rims, with velocities of fragments; the filter of the surface does not take them."""
+        state, covariance = self.state.take(index, axis=0), self.covariance.take(index, axis=0)
         self.state[index], self.covariance[index] = kalman.update(
-            self.state.take(index, axis=0), self.covariance.take(index, axis=0), position_m, noise, 0
-        )
-        self.surface_state[index], self.surface_covariance[index] = kalman.update(
-            self.surface_state.take(index, axis=0),
-            self.surface_covariance.take(index, axis=0),
-            position_m,
-            noise,
-            0,
+            state, covariance, velocity_mps, noise, kalman.VELOCITY
         )
 
-    def reset_position(self, index: NDArray[np.intp], position_m: FloatArray, noise: FloatArray) -> None:
-        """As update_with_centre, but the centre tells nothing about the velocity."""
+    def _apply(self, update: Callable[..., _Estimates], index: Integers, *measured: FloatArray | int) -> None:
+        """Replace both estimates of tracks index (K,) by those that update makes of them and of measured."""
         if len(index) == 0:
             return
-        self.state[index], self.covariance[index] = kalman.reset_position(
-            self.state.take(index, axis=0), self.covariance.take(index, axis=0), position_m, noise
+        self.state[index], self.covariance[index] = update(
+            self.state.take(index, axis=0), self.covariance.take(index, axis=0), *measured
         )
-        self.surface_state[index], self.surface_covariance[index] = kalman.reset_position(
-            self.surface_state.take(index, axis=0),
-            self.surface_covariance.take(index, axis=0),
-            position_m,
-            noise,
+        self.surface_state[index], self.surface_covariance[index] = update(
+            self.surface_state.take(index, axis=0), self.surface_covariance.take(index, axis=0), *measured
         )
 
 
 _COLUMNS = tuple(one.name for one in fields(Tracks) if one.name != "_next_id")
-
-
-@compiled("int64[::1], int64[::1]")
-def _indices(known: NDArray[np.int64], ids: NDArray[np.int64]) -> NDArray[np.intp]:
-    """(N,) position of each of ids (N,) among known, which is in ascending order; -1 where it is not."""
-    result = np.full(len(ids), -1, np.intp)
-    for k in range(len(ids)):
-        place = np.searchsorted(known, ids[k])
-        if place < len(known) and known[place] == ids[k]:
-            result[k] = place
-    return result
 
 
 @compiled("float64[:, ::1]")

@@ -37,7 +37,7 @@ from hal.types import FloatArray, Intrinsics, Pose
 from vision.ego_motion.motion_prior import MotionPrior, SweepPrior
 from vision.ego_motion.reprojection import Anchors, View, view_of
 from vision.ego_motion.robust_fit import Fit, fit, misfits
-from vision.numerics.order import quantile
+from vision.numerics.order import variance_ratio
 
 # Without odometry, at least this share of the fragments must fit one motion of the camera.
 MIN_AGREEMENT = 0.45
@@ -50,10 +50,9 @@ _YAW_AND_TRANSLATION = np.array([1, 3, 4, 5])  # the unknowns that are compared 
 _CONFLICT_CHI2 = 13.3  # 99 %, 4 degrees of freedom
 _TRUSTED_SHARE = np.array([1.0, 0.3, 1.0, 0.2, 0.2, 0.2, 1.0, 1.0])  # of the prior's sigma, tightened
 _BENT_CHI2 = 16.0  # four sigmas: the image alone shows another sweep than the fit
-# Noise of the points in one frame: from the lower third, since static points are at least that many. A third
-# of chi-square with 2 degrees of freedom lies below the first value. Sigmas of more than twice the assumed
-# ones are not noise: something is wrong, such as depth that does not lie where the colour is.
-_CHI2_THIRD, _MAX_NOISE_SCALE = 0.811, 4.0
+# Sigmas of more than twice the assumed ones are not noise: something is wrong, such as depth that does not
+# lie where the colour is.
+_MAX_NOISE_SCALE = 4.0
 _STRAIGHTENED_SHARE = 0.05  # of the points: minimum of additional inliers to accept the larger sweep
 
 
@@ -118,8 +117,7 @@ def estimate(
 
 def _noise_scale(view: View, found: Fit) -> float:
     """Variance of the pixels in this frame, as a ratio to the assumed one, from 1 to _MAX_NOISE_SCALE."""
-    third = quantile(misfits(view, found), 1.0 / 3.0) / _CHI2_THIRD
-    return min(max(third, 1.0), _MAX_NOISE_SCALE)
+    return min(max(variance_ratio(misfits(view, found)), 1.0), _MAX_NOISE_SCALE)
 
 
 def _checked(

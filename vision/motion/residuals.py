@@ -24,12 +24,11 @@ from vision.ego_motion.rolling_shutter import straight_rays
 from vision.fragments.store import AnchorEnds, FragmentStore
 from vision.motion.anchor_depths import AnchorDepths, depth_steps
 from vision.motion.velocities import STATIC_END_CHI2, EndResiduals
-from vision.numerics.order import quantile
+from vision.numerics.order import variance_ratio
 from vision.numerics.pose_axes import inner_point, inner_vector
 
 _SETTLED_FRAMES = 3  # the residuals of younger ends are hardly larger than their noise
 _MIN_ENDS = 16  # minimum for a scale: it is taken from the lower third
-_CHI2_THIRD = 0.811  # one third of static ends lies below; 2 degrees of freedom
 _SCALE_GAIN = 0.15  # per frame: half of a change of floor or light is taken up in four frames
 # Bounds: sigmas of 0.55 to 2.8 times the assumed ones. Anything beyond is not noise.
 _MIN_SCALE = 0.3
@@ -92,14 +91,13 @@ def observed_variance_scale(
     """The variance scale for the next frame, from the scatter of static ends in this one.
 
     It covers errors that are not modelled, such as blur, a rolling shutter, or depth not aligned with colour.
-    The lower third of the ends decides, so that movers which are not yet known do not count. moving (N,):
-    fragments known to move. used: the scale used for motion. before: the one from earlier frames.
+    moving (N,): fragments known to move. used: the scale used for motion. before: that of earlier frames.
     """
     settled = motion.usable & ((age_frames >= _SETTLED_FRAMES) & ~moving).repeat(2)
     chi2 = motion.static_chi2[settled]
     if len(chi2) < _MIN_ENDS:
         return before
-    seen = used * quantile(chi2, 1.0 / 3.0) / _CHI2_THIRD
+    seen = used * variance_ratio(chi2)
     return min(max(before + _SCALE_GAIN * (seen - before), _MIN_SCALE), _MAX_SCALE)
 
 

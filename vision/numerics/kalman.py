@@ -12,6 +12,7 @@ from hal.types import FloatArray, Integers
 _VERTICAL_S = 0.1  # time constant of a vertical velocity: limbs have one, bodies do not
 _UNKNOWNS = 6  # position, then velocity
 _MEASURED = 3  # entries measured at once: either position or velocity
+POSITION, VELOCITY = 0, 3  # index of the first entry of each in a state
 _NOWHERE = np.zeros(3)
 
 
@@ -47,8 +48,7 @@ def update(
 ) -> tuple[FloatArray, FloatArray]:
     """States and covariances after a measurement of three entries of the state.
 
-    measured (T, 3), noise (T, 3, 3): the measurement and its covariance. first: index of the first entry
-    measured, 0 for position and 3 for velocity.
+    measured (T, 3), noise (T, 3, 3): the measurement and its covariance. first: POSITION or VELOCITY.
     """
     return _updated(
         np.ascontiguousarray(state),

@@ -53,6 +53,12 @@ def test_who_has_a_new_number_keeps_the_age_in_the_frames_that_follow() -> None:
     assert after(*CRATE, *renumbered).bodies.age_s.item() == 0.5
 
 
+def test_who_has_a_new_number_keeps_the_age_though_in_one_frame_it_is_a_mere_strip() -> None:
+    renumbered = [(obstacle(4.0, 0.1, age_s=0.033 * k, number=6),) for k in range(1, 12)]
+    renumbered[8] = (replace(renumbered[8][0], extent_m=np.array([0.02, 1.7, 0.2])),)
+    assert after(*CRATE, *renumbered).bodies.age_s.item() == 0.5
+
+
 def test_a_newcomer_is_not_known_by_its_own_surface_of_a_moment_ago() -> None:
     """Something right before the camera, soon gone again: it would be waited for without end."""
     newcomer = [(obstacle(4.0, 0.1, age_s=0.033 * k, number=6),) for k in range(1, 12)]

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from vision.numerics.order import median, quantile
+from vision.numerics.order import indices_of, median, quantile, variance_ratio
 
 
 @pytest.mark.parametrize(
@@ -27,3 +27,23 @@ def test_quantile_by_hand(share: float, expected: float) -> None:
 
 def test_quantile_of_one_value_is_that_value() -> None:
     assert quantile(np.array([2.5]), 0.97) == 2.5
+
+
+@pytest.mark.parametrize("sigma", [0.5, 1.0, 2.0])
+def test_residuals_tell_their_variance_though_half_of_them_are_outliers(sigma: float) -> None:
+    """A third of chi-square with 2 degrees of freedom is below -2 ln(2/3) = 0.811."""
+    residuals = np.random.default_rng(1).normal(scale=sigma, size=(20000, 2))
+    chi2 = np.square(residuals).sum(axis=1)
+    assert variance_ratio(chi2) == pytest.approx(sigma**2, rel=0.03)
+    assert sigma**2 < variance_ratio(np.concatenate((chi2, np.full(20000, 1e3)))) < 3.0 * sigma**2
+
+
+def test_variance_ratio_by_hand() -> None:
+    assert variance_ratio(np.array([9.0, 1.622, 100.0, 0.1])) == pytest.approx(2.0)
+
+
+def test_indices_in_an_ascending_array_and_minus_one_for_what_is_not_in_it() -> None:
+    ordered, values = np.array([2, 5, 9]), np.array([9, 1, 2, 6, 10, 5])
+    assert indices_of(ordered, values).tolist() == [2, -1, 0, -1, -1, 1]
+    assert indices_of(ordered[:0], values).tolist() == [-1] * 6
+    assert indices_of(ordered, values[:0]).tolist() == []
