@@ -45,8 +45,9 @@ def bodies_of(scene: Scene, pose: PlanarPose, mount: CameraMount, depth_m: float
         ],
         dtype=np.float64,
     ).reshape(-1, len(_MAX))
-    said = np.array([(one.age_s, one.unseen_s, one.moving) for one in scene.obstacles], np.float64)
-    age_s, unseen_s, moving = said[:, 0], said[:, 1], said[:, 2] > 0.0
+    age_s = np.array([one.age_s for one in scene.obstacles], np.float64)
+    unseen_s = np.array([one.unseen_s for one in scene.obstacles], np.float64)
+    moving = np.array([one.moving for one in scene.obstacles], np.bool_)
     impossible, on_floor, covariance, sizes = _boxes(
         measured, age_s, unseen_s, moving, depth_m, camera_in_body(mount), pose
     )

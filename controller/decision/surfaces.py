@@ -66,15 +66,7 @@ def check_scan(free: FreeSpace) -> None:
     alike = len(bands) == 1 and free.nearest_m.shape == free.known_m.shape == blank.shape == bands
     if not (alike and free.bearing_tan.dtype == free.nearest_m.dtype == free.known_m.dtype == np.float64):
         raise SceneError(f"{_NO_SCAN}: its bands are not told of alike")
-    wrong, band = _impossible(
-        free.bearing_tan,
-        free.nearest_m,
-        free.known_m,
-        free.half_width_tan,
-        free.blind_m,
-        free.floor_from_m,
-        free.up_tan,
-    )
+    wrong, band = _impossible(free)
     if wrong < 0:
         return
     name, value = _CHECKED[wrong], getattr(free, _CHECKED[wrong])
@@ -87,10 +79,7 @@ def surfaces_of(
     free: FreeSpace, pose: PlanarPose, mount: CameraMount, noise: DepthNoise = TYPICAL_DEPTH_NOISE
 ) -> Surfaces:
     """The surfaces of free, seen by the camera of a robot at pose. noise: of its depth."""
-    seen_m, bands, forward, half_band_m, points = _surfaces(
-        free.bearing_tan, free.half_width_tan, free.nearest_m, free.known_m, _eye(pose, mount)
-    )
-    return Surfaces(seen_m, bands, forward, half_band_m, points, noise)
+    return Surfaces(*_surfaces(free, pose, mount), noise)
 
 
 def floor_points(pose: PlanarPose, ahead_m: FloatArray, left_m: FloatArray) -> FloatArray:
@@ -110,16 +99,102 @@ def bands_at(
     Returns the distance ahead of the camera in metres, and the band, (...) each. A band number outside of
     0..B - 1 is beside the view. Behind the camera the number has no meaning.
     """
-    forward, band = _bands_at(
-        x_m.reshape(-1),
-        y_m.reshape(-1),
-        free.bearing_tan[0] - free.half_width_tan,
-        2.0 * free.half_width_tan,
-        _eye(pose, mount),
-    )
+    forward, band = _bands_at(free, pose, mount, x_m.reshape(-1), y_m.reshape(-1))
     return forward.reshape(x_m.shape), band.reshape(x_m.shape)
 
 
+@inlined
+def _eye(pose: PlanarPose, mount: CameraMount) -> Eye:
+    """The camera of a robot at pose."""
+    cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
+    return (
+        pose.x_m + mount.forward_m * cos - mount.left_m * sin,
+        pose.y_m + mount.forward_m * sin + mount.left_m * cos,
+        cos,
+        sin,
+    )
+
+
+@compiled(FreeSpace)
+def _impossible(free: FreeSpace) -> tuple[int, int]:
+    """Index in _CHECKED of the first impossible value, and its band; -1: none, or not of a single band."""
+    # Written so that NaN fails every comparison.
+    if not 0.0 < free.half_width_tan < math.inf:
+        return 0, -1
+    if not 0.0 <= free.blind_m < math.inf:
+        return 1, -1
+    if not 0.0 <= free.floor_from_m < math.inf:
+        return 2, -1
+    if not free.up_tan > -math.inf:
+        return 3, -1
+    bearing_tan, width_tan = free.bearing_tan, 2.0 * free.half_width_tan
+    for b in range(len(bearing_tan)):
+        apart_tan = width_tan if b == 0 else bearing_tan[b] - bearing_tan[b - 1]
+        if not (math.isfinite(bearing_tan[b]) and abs(apart_tan - width_tan) <= _APART * width_tan):
+            return 4, b
+        if not free.nearest_m[b] >= 0.0:
+            return 5, b
+        if not 0.0 <= free.known_m[b] < math.inf:
+            return 6, b
+    return -1, -1
+
+
+@compiled(Bodies, "float64[:, :], float64[:], float64")
+def _belongs(
+    bodies: Bodies, points_m: FloatArray, forward_m: FloatArray, off_per_m: float
+) -> NDArray[np.bool_]:
+    """(P, N) as Surfaces.of(). off_per_m: growth of the depth noise with the square of forward_m."""
+    return covering(bodies, points_m, AROUND_M + off_per_m * forward_m * forward_m, AROUND_M)
+
+
+@compiled(FreeSpace, PlanarPose, CameraMount)
+def _surfaces(
+    free: FreeSpace, pose: PlanarPose, mount: CameraMount
+) -> tuple[FloatArray, NDArray[np.intp], FloatArray, FloatArray, FloatArray]:
+    """The fields of Surfaces, as surfaces_of()."""
+    bearing_tan, nearest_m, known_m = free.bearing_tan, free.nearest_m, free.known_m
+    eye_x, eye_y, cos, sin = _eye(pose, mount)
+    count, found = len(bearing_tan), 0
+    seen, bands, forward = np.empty(count), np.empty(count, np.intp), np.empty(count)
+    half_band, points = np.empty(count), np.empty((count, 2))
+    for b in range(count):
+        z = nearest_m[b]
+        if not math.isfinite(z):
+            seen[b] = known_m[b] if known_m[b] > 0.0 else 0.0
+            continue
+        seen[b] = z
+        if not math.isfinite(bearing_tan[b]):
+            continue
+        right = z * bearing_tan[b]
+        points[found, 0], points[found, 1] = eye_x + z * cos + right * sin, eye_y + z * sin - right * cos
+        bands[found], forward[found], half_band[found] = b, z, z * free.half_width_tan
+        found += 1
+    return seen, bands[:found], forward[:found], half_band[:found], points[:found]
+
+
+@inlined
+def _band_at(free: FreeSpace, eye: Eye, x_m: float, y_m: float) -> tuple[float, int]:
+    """As bands_at(), for one point."""
+    eye_x, eye_y, cos, sin = eye
+    dx, dy = x_m - eye_x, y_m - eye_y
+    forward, right = dx * cos + dy * sin, dx * sin - dy * cos
+    first_tan, width_tan = free.bearing_tan[0] - free.half_width_tan, 2.0 * free.half_width_tan
+    band = (right / max(forward, 1e-3) - first_tan) / width_tan
+    return forward, math.floor(band) if math.isfinite(band) else -1
+
+
+@compiled(FreeSpace, PlanarPose, CameraMount, "float64[:], float64[:]")
+def _bands_at(
+    free: FreeSpace, pose: PlanarPose, mount: CameraMount, x_m: FloatArray, y_m: FloatArray
+) -> tuple[FloatArray, NDArray[np.intp]]:
+    """As bands_at(), for points (P,)."""
+    eye, forward, band = _eye(pose, mount), np.empty(len(x_m)), np.empty(len(x_m), np.intp)
+    for k in range(len(x_m)):
+        forward[k], band[k] = _band_at(free, eye, x_m[k], y_m[k])
+    return forward, band
+
+
+@compiled(FreeSpace, PlanarPose, CameraMount, "float64[:, :, :], float64, float64, boolean[:]")
 def seen_of(
     free: FreeSpace,
     pose: PlanarPose,
@@ -134,152 +209,12 @@ def seen_of(
     These are seen free up to before_m behind them, or they lie behind a surface in a band for which hides
     (B,) is set. Points nearer than least_m do not count.
     """
-    return _seen_of(
-        points_m,
-        before_m,
-        hides,
-        free.nearest_m,
-        free.known_m,
-        least_m,
-        free.bearing_tan[0] - free.half_width_tan,
-        2.0 * free.half_width_tan,
-        _eye(pose, mount),
-    )
-
-
-def _eye(pose: PlanarPose, mount: CameraMount) -> Eye:
-    """The camera of a robot at pose."""
-    cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
-    return (
-        pose.x_m + mount.forward_m * cos - mount.left_m * sin,
-        pose.y_m + mount.forward_m * sin + mount.left_m * cos,
-        cos,
-        sin,
-    )
-
-
-@compiled("float64[:], float64[:], float64[:], float64, float64, float64, float64")
-def _impossible(
-    bearing_tan: FloatArray,
-    nearest_m: FloatArray,
-    known_m: FloatArray,
-    half_width_tan: float,
-    blind_m: float,
-    floor_from_m: float,
-    up_tan: float,
-) -> tuple[int, int]:
-    """Index in _CHECKED of the first impossible value, and its band; -1: none, or not of a single band."""
-    # Written so that NaN fails every comparison.
-    if not 0.0 < half_width_tan < math.inf:
-        return 0, -1
-    if not 0.0 <= blind_m < math.inf:
-        return 1, -1
-    if not 0.0 <= floor_from_m < math.inf:
-        return 2, -1
-    if not up_tan > -math.inf:
-        return 3, -1
-    width_tan = 2.0 * half_width_tan
-    for b in range(len(bearing_tan)):
-        apart_tan = width_tan if b == 0 else bearing_tan[b] - bearing_tan[b - 1]
-        if not (math.isfinite(bearing_tan[b]) and abs(apart_tan - width_tan) <= _APART * width_tan):
-            return 4, b
-        if not nearest_m[b] >= 0.0:
-            return 5, b
-        if not 0.0 <= known_m[b] < math.inf:
-            return 6, b
-    return -1, -1
-
-
-@compiled(Bodies, "float64[:, :], float64[:], float64")
-def _belongs(
-    bodies: Bodies, points_m: FloatArray, forward_m: FloatArray, off_per_m: float
-) -> NDArray[np.bool_]:
-    """(P, N) as Surfaces.of(). off_per_m: growth of the depth noise with the square of forward_m."""
-    return covering(bodies, points_m, AROUND_M + off_per_m * forward_m * forward_m, AROUND_M)
-
-
-@compiled("float64[:], float64, float64[:], float64[:], UniTuple(float64, 4)")
-def _surfaces(
-    bearing_tan: FloatArray,
-    half_width_tan: float,
-    nearest_m: FloatArray,
-    known_m: FloatArray,
-    eye: Eye,
-) -> tuple[FloatArray, NDArray[np.intp], FloatArray, FloatArray, FloatArray]:
-    """The fields of Surfaces, for a camera at eye."""
-    eye_x, eye_y, cos, sin = eye
-    count, found = len(bearing_tan), 0
-    seen, bands, forward = np.empty(count), np.empty(count, np.intp), np.empty(count)
-    half_band, points = np.empty(count), np.empty((count, 2))
-    for b in range(count):
-        z = nearest_m[b]
-        if not math.isfinite(z):
-            seen[b] = known_m[b] if known_m[b] > 0.0 else 0.0
-            continue
-        seen[b] = z
-        if not math.isfinite(bearing_tan[b]):
-            continue
-        right = z * bearing_tan[b]
-        points[found, 0], points[found, 1] = eye_x + z * cos + right * sin, eye_y + z * sin - right * cos
-        bands[found], forward[found], half_band[found] = b, z, z * half_width_tan
-        found += 1
-    return seen, bands[:found], forward[:found], half_band[:found], points[:found]
-
-
-@inlined
-def _band_at(
-    x_m: float,
-    y_m: float,
-    first_tan: float,
-    width_tan: float,
-    eye: Eye,
-) -> tuple[float, int]:
-    """As bands_at, for one point; the first band begins at first_tan, each is width_tan wide."""
-    eye_x, eye_y, cos, sin = eye
-    dx, dy = x_m - eye_x, y_m - eye_y
-    forward, right = dx * cos + dy * sin, dx * sin - dy * cos
-    band = (right / max(forward, 1e-3) - first_tan) / width_tan
-    return forward, math.floor(band) if math.isfinite(band) else -1
-
-
-@compiled("float64[:], float64[:], float64, float64, UniTuple(float64, 4)")
-def _bands_at(
-    x_m: FloatArray,
-    y_m: FloatArray,
-    first_tan: float,
-    width_tan: float,
-    eye: Eye,
-) -> tuple[FloatArray, NDArray[np.intp]]:
-    """As bands_at, for points (P,)."""
-    forward, band = np.empty(len(x_m)), np.empty(len(x_m), np.intp)
-    for k in range(len(x_m)):
-        forward[k], band[k] = _band_at(x_m[k], y_m[k], first_tan, width_tan, eye)
-    return forward, band
-
-
-@compiled(
-    "float64[:, :, :], float64, boolean[:], float64[:], float64[:], float64,"
-    "float64, float64, UniTuple(float64, 4)"
-)
-def _seen_of(
-    points_m: FloatArray,
-    before_m: float,
-    hides: NDArray[np.bool_],
-    nearest_m: FloatArray,
-    known_m: FloatArray,
-    least_m: float,
-    first_tan: float,
-    width_tan: float,
-    eye: Eye,
-) -> NDArray[np.int64]:
-    """As seen_of; the first band begins at first_tan, each is width_tan wide."""
-    seen = np.zeros(points_m.shape[1], np.int64)
+    eye, seen = _eye(pose, mount), np.zeros(points_m.shape[1], np.int64)
     for row in range(points_m.shape[1]):
         for k in range(points_m.shape[2]):
-            x_m, y_m = points_m[0, row, k], points_m[1, row, k]
-            forward, b = _band_at(x_m, y_m, first_tan, width_tan, eye)
-            if not (0 <= b < len(known_m) and forward > least_m):
+            forward, b = _band_at(free, eye, points_m[0, row, k], points_m[1, row, k])
+            if not (0 <= b < len(free.known_m) and forward > least_m):
                 continue
             reach_m = forward + before_m
-            seen[row] += reach_m <= known_m[b] or (hides[b] and reach_m >= nearest_m[b])
+            seen[row] += reach_m <= free.known_m[b] or (hides[b] and reach_m >= free.nearest_m[b])
     return seen
