@@ -161,7 +161,7 @@ class ChassisMode(Enum):
 
 
 # Only arm(), a person's consent, leads out of these modes.
-LATCHED_MODES = frozenset({ChassisMode.ESTOP, ChassisMode.LOST})
+LATCHED_MODES = (ChassisMode.ESTOP, ChassisMode.LOST)
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,15 +29,15 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.decision.bodies import Bodies, no_bodies
+from controller.decision.bodies import Bodies, covering, no_bodies
 from controller.decision.leftover_strips import leftover_strips
 from controller.decision.seen_through import SeenThrough, unproven
 from controller.decision.unseen_motion import (
     MIN_TRACKED_S,
+    agrees,
     as_tall_as_a_person,
     may_enter_way,
     unseen_or_approaching,
-    velocities_agree,
     with_measured_velocity,
 )
 from controller.decision.unseen_position import (
@@ -182,13 +182,9 @@ class OutOfView:
 
         Movers are kept for a limited time only.
         """
-        part_of = seen.covers(bodies.xy_m, bodies.half_view_m, _SAME_PLACE_M)
+        kept = _still_kept(bodies, since_s, seen, out, pose)
         if not np.count_nonzero(bodies.moving):
-            return _still_kept(out, part_of, bodies.ids, seen.ids)
-        part_of &= velocities_agree(bodies, seen) | ~bodies.moving[:, None]
-        kept_s = np.where(may_enter_way(bodies, pose), _MAY_ENTER_KEPT_S, _MOVING_KEPT_S)
-        timely = ~bodies.moving | (since_s <= kept_s)
-        kept = _still_kept(out & timely, part_of, bodies.ids, seen.ids)
+            return kept
         return kept & ~leftover_strips(bodies, kept)
 
     def _outside_view(self, bodies: Bodies, pose: PlanarPose, edges: ViewEdges) -> BoolArray:
@@ -208,12 +204,21 @@ def _missing(ids: IntArray, seen_ids: IntArray) -> BoolArray:
     return missing
 
 
-@compiled("boolean[:], boolean[:, :], int64[:], int64[:]")
-def _still_kept(outside: BoolArray, part_of: BoolArray, ids: IntArray, seen_ids: IntArray) -> BoolArray:
-    """(N,) which bodies are outside, not among seen_ids (M,), and not part of a seen body: part_of (N, M)."""
-    kept = np.empty(len(ids), np.bool_)
-    for k in range(len(ids)):
-        kept[k] = outside[k] and not (seen_ids == ids[k]).any() and not part_of[k].any()
+@compiled(Bodies, "float64[:]", Bodies, "boolean[:]", PlanarPose)
+def _still_kept(
+    bodies: Bodies, since_s: FloatArray, seen: Bodies, out: BoolArray, pose: PlanarPose
+) -> BoolArray:
+    """(N,) as OutOfView._still_there(), leftover strips included."""
+    covered = covering(seen, bodies.xy_m, bodies.half_view_m, _SAME_PLACE_M)
+    kept = out.copy()
+    for k in range(len(kept)):
+        moving = bodies.moving[k]
+        if moving and since_s[k] > (_MAY_ENTER_KEPT_S if may_enter_way(bodies, k, pose) else _MOVING_KEPT_S):
+            kept[k] = False
+        for m in range(len(seen.ids)):
+            part_of = covered[k, m] and (not moving or agrees(bodies, k, seen, m))
+            if part_of or seen.ids[m] == bodies.ids[k]:
+                kept[k] = False
     return kept
 
 

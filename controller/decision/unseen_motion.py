@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.decision.bodies import Bodies
-from hal.compiled import compiled
+from hal.compiled import compiled, inlined
 from hal.types import FloatArray, PlanarPose
 
 BoolArray = NDArray[np.bool_]
@@ -63,21 +63,18 @@ def significant_component(velocity_mps: FloatArray, covariance: FloatArray, alon
     return part_mps if abs(part_mps) > math.sqrt(float(along @ covariance @ along)) else 0.0
 
 
-@compiled(Bodies, PlanarPose)
-def may_enter_way(bodies: Bodies, pose: PlanarPose) -> BoolArray:
-    """(N,) which bodies may come into the robot's way.
+@inlined
+def may_enter_way(bodies: Bodies, k: int, pose: PlanarPose) -> bool:
+    """Whether body k may come into the robot's way.
 
-    That is, they move towards the robot's axis from either side, or along with the robot (more than
-    _ALONG_TO_OUTWARD_RATIO times as fast forward as outwards), from where one may cut in.
+    That is, it moves towards the robot's axis from either side, or along with the robot (more than
+    _ALONG_TO_OUTWARD_RATIO times as fast forward as outwards), from where it may cut in.
     """
     cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
-    comes = np.empty(len(bodies.xy_m), np.bool_)
-    for k in range(len(comes)):
-        vx, vy = bodies.velocity_mps[k]
-        left = (bodies.xy_m[k, 1] - pose.y_m) * cos - (bodies.xy_m[k, 0] - pose.x_m) * sin
-        leftward, forward = vy * cos - vx * sin, vx * cos + vy * sin
-        comes[k] = left * leftward < 0.0 or forward > _ALONG_TO_OUTWARD_RATIO * abs(leftward)
-    return comes
+    vx, vy = bodies.velocity_mps[k]
+    left = (bodies.xy_m[k, 1] - pose.y_m) * cos - (bodies.xy_m[k, 0] - pose.x_m) * sin
+    leftward, forward = vy * cos - vx * sin, vx * cos + vy * sin
+    return bool(left * leftward < 0.0 or forward > _ALONG_TO_OUTWARD_RATIO * abs(leftward))
 
 
 def with_measured_velocity(bodies: Bodies, mistaken_mps: float) -> Bodies:
@@ -101,21 +98,28 @@ def hardly_stood(bodies: Bodies) -> BoolArray:
     return _moves_before_verdict(bodies, _APPROACH_MIN_SIGMAS, math.inf)
 
 
-@compiled(Bodies, Bodies)
-def velocities_agree(bodies: Bodies, seen: Bodies) -> BoolArray:
-    """(N, M) whether the measured velocity of each of M seen bodies agrees with that of each of these N.
+@inlined
+def agrees(bodies: Bodies, k: int, seen: Bodies, m: int) -> bool:
+    """Whether the measured velocity of the seen body m agrees with that of body k.
 
     A seen body that was tracked for MIN_TRACKED_S or less agrees with none: its velocity is hardly known and
     would fit any body.
     """
+    agree = seen.tracked_s[m] > MIN_TRACKED_S
+    for axis in range(2):
+        differs = bodies.velocity_mps[k, axis] - seen.measured_mps[m, axis]
+        spread = bodies.covariance[k, axis, axis] + seen.covariance[m, axis, axis]
+        agree &= differs**2 <= _SAME_VELOCITY_SIGMAS**2 * spread
+    return bool(agree)
+
+
+@compiled(Bodies, Bodies)
+def velocities_agree(bodies: Bodies, seen: Bodies) -> BoolArray:
+    """(N, M) whether the velocity of each of M seen bodies agrees with that of each of N bodies."""
     agree = np.empty((len(bodies.velocity_mps), len(seen.measured_mps)), np.bool_)
     for k in range(agree.shape[0]):
         for m in range(agree.shape[1]):
-            agree[k, m] = seen.tracked_s[m] > MIN_TRACKED_S
-            for axis in range(2):
-                differs = bodies.velocity_mps[k, axis] - seen.measured_mps[m, axis]
-                spread = bodies.covariance[k, axis, axis] + seen.covariance[m, axis, axis]
-                agree[k, m] &= differs**2 <= _SAME_VELOCITY_SIGMAS**2 * spread
+            agree[k, m] = agrees(bodies, k, seen, m)
     return agree
 
 
