@@ -37,6 +37,17 @@ def test_before_and_behind_the_path_it_is_as_wide_as_at_its_ends() -> None:
     assert corridor.half_width_at(math.nan) == widths[0]
 
 
+def test_points_are_located_with_the_swept_width_where_they_are() -> None:
+    """One beside the middle of a quarter turn, and one that is searched for no farther than to 1.0 m."""
+    corridor = Corridor(arc_path(4.0, 90.0), BODY)
+    middle = 4.0 * math.sin(math.pi / 4.0)
+    points = np.array([[middle - 0.5 * math.sqrt(0.5), 4.0 - middle + 0.5 * math.sqrt(0.5)]])
+    s_m, d_m, half_width_m = corridor.locate(points, 0.0, 6.0)[:, 0]
+    assert (s_m, d_m) == (pytest.approx(math.pi), pytest.approx(0.5))
+    assert half_width_m == corridor.half_width_at(math.pi)
+    assert corridor.locate(points, 0.0, 1.0)[0, 0] == 1.0
+
+
 def test_a_standing_body_blocks_the_robot_from_front_to_tail() -> None:
     corridor = Corridor(line_path(), BODY)
     placed = place(box(8.0, 0.9), corridor, np.array([0.0, 4.0]), 0.0, 12.0)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
 from config.decision import DecisionConfig, SightConfig
-from controller.decision.standing_limits import _stop_distances
+from controller.decision.standing_limits import _stands_within, _stop_distances
 from tests.support.closed_loop import Box, Mission, standing_at, straight
 
 
@@ -24,3 +26,10 @@ def test_only_what_hangs_is_stood_off_for_the_sake_of_the_upper_edge() -> None:
     off_m = _stop_distances(np.full(2, 5.0), np.array([0.0, 0.8]), 0.6, 0.1, 0.45, 1.3)
     assert off_m.tolist() == [1.3, 3.0]
     assert _stop_distances(np.full(1, 0.3), np.zeros(1), 0.6, 0.1, 0.45, 1.3).tolist() == [0.45]
+
+
+def test_bodies_count_from_a_clearance_up_to_another_and_only_if_they_stand() -> None:
+    clearance_m = np.array([-0.1, 0.0, 0.1, 0.3, 0.31, 0.1])
+    moving = np.array([False, False, False, False, False, True])
+    assert _stands_within(moving, clearance_m, 0.0, 0.3).nonzero()[0].tolist() == [2, 3]
+    assert _stands_within(moving, clearance_m, -math.inf, 0.3).nonzero()[0].tolist() == [0, 1, 2, 3]
