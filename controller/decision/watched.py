@@ -23,7 +23,7 @@ from hal.types import FloatArray
 # until it does not. Meanwhile the worst case covers it.
 _DEBOUNCE_S = 0.3
 _BEYOND_RANGE_M = 2.0  # bodies are placed along the path up to this far beyond the camera's range
-_NONE = np.zeros(0, np.bool_)
+_NO_FLAGS = np.zeros(0, np.bool_)
 
 
 @record(frozen=True, slots=True, eq=False)
@@ -56,13 +56,13 @@ class Watch:
         self._config, self._times_s = config, times_s
         self._enters = Debounced(_DEBOUNCE_S)
         self._bodies = no_bodies(0)
-        self._remembered = _NONE
+        self._remembered = _NO_FLAGS
 
     def take_in(self, known: WorldModel) -> None:
         """Select the watched bodies of a new scene."""
         watched = known.bodies.moving | (known.bodies.age_s < self._config.prediction.confirm_s)
         self._bodies = known.bodies.select(watched)
-        self._remembered = known.remembered[watched] if len(self._bodies) else _NONE
+        self._remembered = known.remembered[watched] if len(self._bodies) else _NO_FLAGS
 
     def step(self, known: WorldModel, s_m: float, now_s: float) -> Watched | None:
         """The watched bodies at now_s, for a robot at s_m; None: there are none."""
