@@ -79,9 +79,8 @@ def describe(trials: list[TrialResult], kills: list[KillResult], kind: str | Non
     if kills:
         lines += [
             "",
-            f"In real time, with three processes ({kind} emulator, control, perception), from 0.3 m/s or more.",
-            "The time is taken from the speed that the emulator prints ten times per second; while it is frozen",
-            "it prints nothing.",
+            f"In real time, three processes ({kind} emulator, control, perception), from 0.3 m/s or more.",
+            "The emulator prints its speed ten times per second; while it is frozen it prints nothing.",
             "",
             "| fault | base stood after | the mission ended with | exit code |",
             "|---|---|---|---|",
