@@ -116,6 +116,6 @@ class Ending:
 def _goes_on(state: ChassisState) -> str:
     told = f"told to stand for {STILL_GOING_S:g} s, "
     if math.isfinite(state.v_mps + state.w_radps):
-        told += f"the base still tells of {state.v_mps:.2f} m/s and {state.w_radps:.2f} rad/s"
+        told += f"the base still reports {state.v_mps:.2f} m/s and {state.w_radps:.2f} rad/s"
         return f"{told}; does it hold itself where it stands, and do its motors obey?"
     return f"{told}the base does not tell how fast it goes"

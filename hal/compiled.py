@@ -48,7 +48,7 @@ R = TypeVar("R")
 
 _FIRST_TIME = "treadwatch: compiling for this processor, which is done once and takes a minute or two\n"
 _EVERY_TIME = (
-    "treadwatch: what is compiled for this processor cannot be kept, so every start takes a minute or two; "
+    "treadwatch: compiled code cannot be cached, so every start takes a minute or two; "
     "NUMBA_CACHE_DIR may name a folder for it ({})\n"
 )
 _told: set[str] = set()

@@ -242,7 +242,7 @@ class SpeedGovernor:
                 )
                 reason = Reason("robot", sentence)
         elif reason.rule == "target":
-            reason = Reason("robot", f"such an arc is looked along only so far: {target_mps:.2f} m/s")
+            reason = Reason("robot", f"the arc is checked for a limited distance: {target_mps:.2f} m/s")
         return self._with(decision, target_mps, reason, emergency=decision.emergency)
 
     def _with(self, decision: Decision, target_mps: float, reason: Reason, *, emergency: bool) -> Decision:

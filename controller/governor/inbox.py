@@ -148,7 +148,7 @@ class Inbox:
     ) -> bool:
         if sender != session.sender:
             has = f"{_name(session.sender)} has the command"
-            return self._drop("from another sender", f"{_name(sender)} is not obeyed while {has}")
+            return self._drop("from another sender", f"{_name(sender)} is ignored while {has}")
         if request.seq == session.last.seq:
             return self._drop("duplicate", f"seq {request.seq} came twice")
         if request.seq < session.last.seq:

@@ -111,7 +111,7 @@ def test_the_jitter_of_a_counter_is_rest() -> None:
     [
         (
             (0.3, -0.1),
-            "told to stand for 6 s, the base still tells of 0.30 m/s and -0.10 rad/s; does it hold itself "
+            "told to stand for 6 s, the base still reports 0.30 m/s and -0.10 rad/s; does it hold itself "
             "where it stands, and do its motors obey?",
         ),
         ((math.nan, math.nan), "told to stand for 6 s, the base does not tell how fast it goes"),

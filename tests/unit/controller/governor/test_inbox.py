@@ -163,7 +163,7 @@ def test_one_planner_at_a_time() -> None:
     talk.say(900, 0, 0.9, OTHER)
     assert talk.poll(0).twist == Twist(0.4, 0.1)
     assert talk.inbox.dropped == {"from another sender": 1}
-    assert "10.0.0.2:5000 is not obeyed while 10.0.0.1:5000 has the command" in talk.warnings[0]
+    assert "10.0.0.2:5000 is ignored while 10.0.0.1:5000 has the command" in talk.warnings[0]
     # The first one falls silent: then the other one is heard.
     assert talk.poll(300).twist is None
     talk.say(901, 300, 0.9, OTHER)
