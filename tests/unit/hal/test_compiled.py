@@ -74,7 +74,7 @@ def test_step_is_compiled_with_a_message_if_it_cannot_be_cached(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A function of no file, for which the compiler finds no place."""
-    monkeypatch.setattr("hal.compiled._told", set())
+    monkeypatch.setattr("hal.compiled._warned", set())
     scope: dict[str, Any] = {}
     exec(compile("def twice(value):\n    return 2.0 * value\n", "<nowhere>", "exec"), scope)
     assert compiled("float64")(scope["twice"])(1.5) == 3.0
