@@ -51,7 +51,7 @@ class LockstepRunner(Section):
     max_standing_s: float = Field(
         default=120.0,
         gt=0,
-        description="give up once the robot has stood for so long; nobody comes to help it",
+        description="end the run once the robot has stood for this long",
     )
 
 
@@ -168,7 +168,7 @@ class AppConfig(Section):
                 f"camera.kind {self.camera.kind!r} needs a 'path': there is no scenario to give one"
             )
         if self.governor is not None and self.path is not None:
-            raise ValueError("give a 'path' or a 'governor', not both: who plans the way?")
+            raise ValueError("give a 'path' or a 'governor', not both")
         if self.governor is not None and self.runner.kind != "realtime":
             raise ValueError("a 'governor' hears commands as they come and needs runner.kind 'realtime'")
         if simulated and self.path is not None:

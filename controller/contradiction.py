@@ -50,7 +50,7 @@ class Contradiction:
         self.sentence = ""
         if moves and (elsewhere or turned):
             self.sentence = (
-                f"the camera sees {seen_m:+.2f} m ahead and {seen_rad:+.2f} rad where the base tells of "
+                f"the camera sees {seen_m:+.2f} m ahead and {seen_rad:+.2f} rad where the base reports "
                 f"{told_m:+.2f} m and {told_rad:+.2f} rad; do its motors turn the right way, "
                 "are its scales right in chassis:, do its tracks slip?"
             )

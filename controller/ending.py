@@ -17,7 +17,7 @@ SETTLE_S = 0.5
 # A base that has not armed after this time will not; the drive ends instead of waiting for ever.
 ARM_TIMEOUT_S = 5.0
 # A base that lags by 2 s has come to rest this long after the last command that moved it.
-STILL_GOING_S = 6.0
+REST_TIMEOUT_S = 6.0
 
 # Below these, measured speeds count as rest: the jitter of a coarse encoder, the noise of a gyro.
 REST_MPS = 0.02
@@ -51,7 +51,7 @@ class Ending:
         self._asked_for = Outcome.STOPPED
         self._started_ns: int | None = None
         self._was_armed = False
-        self._told_to_stand_since_ns: int | None = None
+        self._commanded_to_stand_since_ns: int | None = None
         self._resting_since_ns: int | None = None
 
     def request_stop(self, reason: str, outcome: Outcome) -> None:
@@ -82,14 +82,14 @@ class Ending:
             return
         told_to_stand = setpoint.v_mps == 0.0 and setpoint.a_mps2 == 0.0 and setpoint.w_radps == 0.0
         if not told_to_stand or not (arrived or self.stop_reason is not None):
-            self._told_to_stand_since_ns = self._resting_since_ns = None
+            self._commanded_to_stand_since_ns = self._resting_since_ns = None
             return
-        if self._told_to_stand_since_ns is None:
-            self._told_to_stand_since_ns = now_ns
+        if self._commanded_to_stand_since_ns is None:
+            self._commanded_to_stand_since_ns = now_ns
         if self._settled(state, now_ns):
             self._end(Outcome.REACHED if arrived else self._asked_for, None, now_ns)
-        elif now_ns - self._told_to_stand_since_ns >= STILL_GOING_S * NS_PER_S:
-            self._end(Outcome.CHASSIS_FAULT, _goes_on(state), now_ns)
+        elif now_ns - self._commanded_to_stand_since_ns >= REST_TIMEOUT_S * NS_PER_S:
+            self._end(Outcome.CHASSIS_FAULT, _still_moving_text(state), now_ns)
 
     def _settled(self, state: ChassisState, now_ns: int) -> bool:
         """Whether the base has measured rest for long enough, and has reported since then.
@@ -113,9 +113,9 @@ class Ending:
         self._chassis.stop(now_ns)
 
 
-def _goes_on(state: ChassisState) -> str:
-    told = f"told to stand for {STILL_GOING_S:g} s, "
+def _still_moving_text(state: ChassisState) -> str:
+    text = f"commanded to stand for {REST_TIMEOUT_S:g} s, "
     if math.isfinite(state.v_mps + state.w_radps):
-        told += f"the base still tells of {state.v_mps:.2f} m/s and {state.w_radps:.2f} rad/s"
-        return f"{told}; does it hold itself where it stands, and do its motors obey?"
-    return f"{told}the base does not tell how fast it goes"
+        text += f"the base still reports {state.v_mps:.2f} m/s and {state.w_radps:.2f} rad/s"
+        return f"{text}; does it hold itself where it stands, and do its motors obey?"
+    return f"{text}the base does not tell how fast it goes"

@@ -201,10 +201,10 @@ def _mount_notes(options: ReplayOptions, config: ReplayConfig, recorded: CameraM
 
 def _assumed(options: ReplayOptions, config: ReplayConfig) -> str:
     if not config.assume_mount:
-        return "the recording does not tell the camera's mounting: the floor is looked for in the depth"
+        return "the recording does not give the camera's mounting: the floor is found in the depth"
     given = config.robot.camera_mount
     return (
-        f"the recording does not tell the camera's mounting: it is that of {options.config_path}, "
+        f"the recording does not give the camera's mounting: it is that of {options.config_path}, "
         f"{given.height_m:.2f} m high and tipped by {math.degrees(given.pitch_rad):.1f} degrees"
     )
 
@@ -224,7 +224,7 @@ def _summary(
             f"{len(tally.ids)} seen, {len(tally.moving_ids)} of them moving"
             + (f"; nearest {tally.nearest_m:.2f} m ahead" if math.isfinite(tally.nearest_m) else ""),
         ),
-        ("decisions", f"{_counts(tally)}; of a robot that goes straight ahead"),
+        ("decisions", f"{_counts(tally)}; for a robot that drives straight ahead"),
         ("camera", _camera(tally)),
         ("perception", tally.timing.line()),
     ]

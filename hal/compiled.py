@@ -48,13 +48,13 @@ R = TypeVar("R")
 
 _FIRST_TIME = "treadwatch: compiling for this processor, which is done once and takes a minute or two\n"
 _EVERY_TIME = (
-    "treadwatch: what is compiled for this processor cannot be kept, so every start takes a minute or two; "
+    "treadwatch: compiled code cannot be cached, so every start takes a minute or two; "
     "NUMBA_CACHE_DIR may name a folder for it ({})\n"
 )
-_told: set[str] = set()
+_warned: set[str] = set()
 _CONSTANTS = (bool, int, float, str, tuple, np.generic)
 # What reading or writing the cache may raise: a full disk, no writable folder, a truncated file.
-_NOT_KEPT = (
+_CACHE_ERRORS = (
     OSError,
     RuntimeError,
     EOFError,
@@ -112,7 +112,7 @@ def _compile(function: Callable[P, R], signature: tuple[types.Type, ...]) -> Cal
             return _build(function, signature, kept=True, anew=anew)
         except NumbaError:
             raise  # an error in the step itself
-        except _NOT_KEPT as error:
+        except _CACHE_ERRORS as error:
             why = str(error).partition("\n")[0]
     _say(_EVERY_TIME, why)
     return _build(function, signature, kept=False)
@@ -197,8 +197,8 @@ def _rests_on(function: FunctionType) -> Iterator[object]:
 
 def _say(sentence: str, *values: str) -> None:
     """Write to standard error, each sentence only once."""
-    if sentence not in _told:
-        _told.add(sentence)
+    if sentence not in _warned:
+        _warned.add(sentence)
         sys.stderr.write(sentence.format(*values))
 
 

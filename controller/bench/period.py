@@ -86,9 +86,9 @@ def run_period_bench(seconds: float) -> None:
     # This process keeps the real-time scheduling of the second drive.
     _print_row("SCHED_FIFO, empty loop", partial(measure_empty_loop, clock, seconds))
     say_result(
-        "off: distance of one period from 20 ms. empty loop: nothing but waiting for the next 20 ms, so it\n"
-        "shows what is the machine's. load: average of the minute. stolen: processor time that the host of\n"
-        "a virtual machine gave to others meanwhile, of all cores."
+        "off: deviation of a period from 20 ms. empty loop: only waits for the next 20 ms, so it shows what\n"
+        "is due to the machine. load: average of the last minute. stolen: processor time that the host of\n"
+        "a virtual machine gave to others in the meantime, all cores together."
     )
 
 

@@ -57,7 +57,8 @@ def run(options: MissionOptions) -> None:
 def govern(options: MissionOptions) -> None:
     """Slow another planner's commands down to what is safe.
 
-    It sends (v, w), until SIGTERM. The messages, and a client in thirty lines: docs/governor.md.
+    The planner sends (v, w); the drive ends with SIGTERM. The messages, and a client in thirty lines, are in
+    docs/governor.md.
     Exit code 0 if the robot came to rest as the signal asked, nothing was touched, the limits were kept and
     all files were written; else 1.
     """
@@ -86,10 +87,11 @@ def replay(
     video: Path | None,
     quiet: bool,
 ) -> None:
-    """Look at a recording as the robot would.
+    """Perceive and decide on a recording, as the robot would.
 
-    A TUM RGB-D folder, or a ROS bag (.bag, .db3, .mcap), also that of a RealSense viewer. Where it does not
-    tell the camera's mounting, that of a robot's FILE is used; without one the floor is looked for.
+    RECORDING is a TUM RGB-D folder or a ROS bag (.bag, .db3, .mcap), also one of a RealSense viewer. If it
+    does not give the camera's mounting, that of the robot's FILE is used; without FILE, the floor is found in
+    the depth.
     """
     from controller.replay import ReplayOptions, run_replay
     from hal.cameras.bag_topics import WantedTopics
@@ -121,8 +123,8 @@ def envelope(config_path: Path) -> None:
 )
 @click.option("--interface", help="CAN: another python-can interface than the channel suggests.")
 @click.option("--port", type=WholeNumber(1024, 65535), help="CAN over multicast: the UDP port.")
-@config_option("whose chassis and simulation.plant it plays", None, "the hil-KIND.yaml that ships")
-@click.option("--tell", is_flag=True, help="Say ten times a second how the base moves.")
+@config_option("whose chassis and simulation.plant are emulated", None, "the hil-KIND.yaml that ships")
+@click.option("--tell", is_flag=True, help="Print the motion of the base ten times per second.")
 def emulate(
     kind: str,
     channel: str | None,
@@ -131,11 +133,11 @@ def emulate(
     config_path: Path | None,
     tell: bool,
 ) -> None:
-    """Be a tracked base, in real time, until SIGTERM.
+    """Emulate a tracked base, in real time, until SIGTERM.
 
     Drive it with `treadwatch run --config config/hil-KIND.yaml`.
 
-    Type estop, release, restart, freeze or thaw and Enter to see what the driver makes of it.
+    Type estop, release, restart, freeze or thaw and Enter to see how the driver reacts.
     """
     from controller.cli.emulate import EmulateOptions, run_emulator
 

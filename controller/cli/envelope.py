@@ -128,12 +128,12 @@ def describe_envelope(config: AppConfig) -> Iterator[str]:
     """The report, line by line."""
     result = envelope_of(config)
     paper, tau = result.paper, result.latency
-    yield f"At {result.v_mps:g} m/s against an obstacle that comes at {result.obstacle_mps:g} m/s"
+    yield f"At {result.v_mps:g} m/s against an obstacle that approaches at {result.obstacle_mps:g} m/s"
     yield ""
     yield f"Daeef 2020 (deceleration {result.comfort.brake.decel_mps2:g} m/s2, no jerk limit, no latency)"
     yield _row("S_r = V^2 / 2A", paper.s_r_m, "m", "braking distance")
     yield _row("T_t = V / A", paper.t_t_s, "s", "time to stop")
-    yield _row("S_n = S_r + V_o T_t", paper.s_n_m, "m", "distance at which it must be seen")
+    yield _row("S_n = S_r + V_o T_t", paper.s_n_m, "m", "required detection distance")
     yield ""
     yield (
         f"Latency tau = {tau.total_s:.3f} s: scene {tau.scene_s:.3f} + command period {tau.period_s:.3f} "
@@ -151,11 +151,11 @@ def _describe(name: str, terms: StopTerms, range_m: float) -> Iterator[str]:
     yield f"{name} braking ({terms.brake.decel_mps2:g} m/s2, {terms.brake.jerk_mps3:g} m/s3)"
     yield _row("S", terms.stop_m, "m", f"of which the jerk limit {terms.jerk_m:.2f} m")
     yield _row("T", terms.stop_s, "s", f"of which the jerk limit {terms.jerk_s:.2f} s")
-    yield _row("(V + V_o) tau", terms.latency_m, "m", "driven and walked before it brakes")
-    yield _row("V_o T", terms.approach_m, "m", "walked while it brakes")
-    yield _row("margin", terms.margin_m, "m", "left at standstill")
+    yield _row("(V + V_o) tau", terms.latency_m, "m", "travelled by both before it brakes")
+    yield _row("V_o T", terms.approach_m, "m", "travelled by the obstacle while it brakes")
+    yield _row("margin", terms.margin_m, "m", "kept at standstill")
     yield _row("S_n, the sum", terms.s_n_m, "m", f"{fits} the {range_m:.2f} m that are seen")
-    yield _row("V that the range admits", terms.admits_mps, "m/s", "for an obstacle that comes at V_o")
+    yield _row("V that the range admits", terms.admits_mps, "m/s", "for an obstacle that approaches at V_o")
     yield _row("", terms.admits_static_mps, "m/s", "for an obstacle that stands")
 
 
@@ -166,7 +166,7 @@ def _row(name: str, value: float, unit: str, note: str) -> str:
 def _not_covered(config: AppConfig) -> Iterator[str]:
     sight = config.decision.sight
     yield "Not covered: the sides and the rear; what comes into view nearer than S_n; glass and mirrors"
-    yield f"that give a false depth; low things nearer than {sight.near_m:g} m to the camera, or below its"
+    yield f"that give a false depth; low obstacles nearer than {sight.near_m:g} m to the camera, or below its"
     yield f"view, that were never seen; what is nearer than {config.perception.min_depth_m:g} m; obstacles"
     yield "faster than V_o."
     yield "This is no safety rating: it does not replace a certified detection of persons (ISO 3691-4)"

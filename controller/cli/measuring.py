@@ -33,16 +33,16 @@ from controller.errors import UserError
     help="Length of each simulated reel.",
 )  # fmt: skip
 @click.option(
-    "--period", is_flag=True, help="Instead: the command period in real time, perception at full load."
+    "--period", is_flag=True, help="Measure the command period in real time instead, perception at full load."
 )
 @click.option(
     "--seconds", type=WholeNumber(5, 60), default=30, show_default=True,
-    help="With --period: how long, with ordinary scheduling and again with SCHED_FIFO.",
+    help="With --period: duration of each run, one with ordinary scheduling and one with SCHED_FIFO.",
 )  # fmt: skip
 def bench(json_path: Path | None, frames: int, period: bool, seconds: float) -> None:
     """Measure speed, stage by stage.
 
-    Perception beside the bare OpenCV calls, renderer, control step, driver, lock-step runner.
+    Perception compared with the bare OpenCV calls, renderer, control step, driver, lock-step runner.
     """
     if period:
         if json_path is not None:
@@ -58,7 +58,7 @@ def bench(json_path: Path | None, frames: int, period: bool, seconds: float) -> 
 
 @click.command(cls=Command)
 @click.argument("recordings", type=FOLDER_OR_FILE, nargs=-1)
-@click.option("--sim", "simulated", is_flag=True, help="The simulated set, with truth.")
+@click.option("--sim", "simulated", is_flag=True, help="Run the simulated set, which has truth.")
 @click.option(
     "--report", type=FOLDER, required=True, help="Folder for report.md, summary.json and the figures."
 )
@@ -66,12 +66,15 @@ def bench(json_path: Path | None, frames: int, period: bool, seconds: float) -> 
     "--odometry", type=ODOMETRY, default="auto", show_default="odometry.txt if there is one",
     help="Recordings: prior of the camera's motion. The simulated set is run with and without.",
 )  # fmt: skip
-@click.option("--static", is_flag=True, help="Recordings: nothing moves but the camera, so all is false.")
+@click.option(
+    "--static", is_flag=True,
+    help="Recordings in which only the camera moves: every moving obstacle is false.",
+)  # fmt: skip
 @click.option(
     "--baselines", type=click.Choice(["none", "some", "all"]), default="some", show_default=True,
     help="Simulated set: the methods of the paper's Table 1 on no, some or all sequences.",
 )  # fmt: skip
-@click.option("--only", multiple=True, metavar="NAME", help="Simulated set: this sequence; may be repeated.")
+@click.option("--only", multiple=True, metavar="NAME", help="Simulated set: only this one; may be repeated.")
 @click.option(
     "--workers", type=WholeNumber(1, 64), default=min(os.cpu_count() or 1, 8), show_default=True,
     help="Processes that share the simulated set.",
@@ -103,18 +106,18 @@ def evaluate(
 @config_option("of robot, camera, chassis, perception and decision")
 @click.option(
     "--missions", type=WholeNumber(1, 1_000_000), default=260, show_default=True,
-    help="How many, spread evenly over the families or scenarios, each with seeds of its own.",
+    help="Number of missions, spread evenly over the families or scenarios, each with its own seeds.",
 )  # fmt: skip
 @click.option(
     "--families",
     metavar="A,B,...",
-    help="Scenario families; all of them by default, or with --scenario none.",
+    help="Scenario families. Default: all; with --scenario: none.",
 )
 @click.option(
     "--scenario", "scenarios", multiple=True, metavar="FILE",
-    help="Your own world, or the name of one that ships, in place of the families; may be repeated.",
+    help="A scenario file, or the name of one that ships, in place of the families; may be repeated.",
 )  # fmt: skip
-@click.option("--policies", metavar="A,B,...", help="ours, paper, zones, field; all of them by default.")
+@click.option("--policies", metavar="A,B,...", help="ours, paper, zones, field. Default: all.")
 @perception_mode("noise")
 @click.option(
     "--workers", type=WholeNumber(1, 256), default=min(os.cpu_count() or 1, 8), show_default=True,
@@ -125,12 +128,12 @@ def evaluate(
     "--report", type=FOLDER,
     help="Folder for missions.jsonl, summary.json, report.md and the figures.",
 )  # fmt: skip
-@click.option("--resume", is_flag=True, help="Go on with a campaign that was broken off.")
+@click.option("--resume", is_flag=True, help="Continue a campaign that was interrupted.")
 @click.option(
     "--scheduler", metavar="ADDRESS", help="Run on a Dask cluster, for example tcp://10.0.0.5:8786."
 )
-@click.option("--only", metavar="FAMILY:SEED", help="One mission alone; also FILE.yaml:SEED.")
-@click.option("--video", is_flag=True, help="Camera mode: keep recordings and videos of what fails.")
+@click.option("--only", metavar="FAMILY:SEED", help="A single mission; also FILE.yaml:SEED.")
+@click.option("--video", is_flag=True, help="Camera mode: keep recordings and videos of failed missions.")
 @no_progress_bar
 def campaign(
     config_path: Path,
@@ -148,9 +151,9 @@ def campaign(
     video: bool,
     quiet: bool,
 ) -> None:
-    """Drive missions of every kind, several policies side by side.
+    """Drive missions of all families with several policies.
 
-    Exit code 1 if ours failed.
+    Exit code 1 if treadwatch's own policy failed a mission.
     """
     from controller.campaign.command import CampaignOptions, run_campaign
 
@@ -171,7 +174,7 @@ def _names(option: str, text: str | None) -> tuple[str, ...]:
 
 @click.command("stop-and-go", cls=Command)
 @config_option("of robot, camera, chassis, perception and decision")
-@click.option("--drives", type=WholeNumber(1, 10_000), default=8, show_default=True, help="How often.")
+@click.option("--drives", type=WholeNumber(1, 10_000), default=8, show_default=True, help="Number of drives.")
 @first_seed(0)
 @perception_mode("camera")
 @click.option(
@@ -189,9 +192,10 @@ def stop_and_go(
     keep: bool,
     quiet: bool,
 ) -> None:
-    """Somebody steps into the way, stands, leaves.
+    """Measure how the robot stops for a person and drives on.
 
-    Measured as Nav2's collision monitor is. Exit code 1 if a target is missed.
+    The person steps in, stands and leaves. The metrics are those of Nav2's collision monitor. Exit code 1 if
+    a target is missed.
     """
     from controller.campaign.stop_and_go_command import StopAndGoOptions, run_stop_and_go
 
@@ -203,9 +207,9 @@ def stop_and_go(
     "--processes", "kind", type=BASES,
     help="Also kill and freeze the processes of this chassis' mission, in real time (two minutes).",
 )  # fmt: skip
-@click.option("--into", type=FILE, help="Put the tables into this page, in place of the old ones.")
+@click.option("--into", type=FILE, help="Write the tables into this page, in place of the old ones.")
 def faults(kind: str | None, into: Path | None) -> None:
-    """Break things and tell what happened.
+    """Inject faults and report what happens.
 
     E-stop, restart, unplugging, freezing; with --processes also kill -9.
     """

@@ -84,10 +84,10 @@ def recording_options(command: Callable[..., None]) -> Callable[..., None]:
         click.option(
             "--observations",
             type=FILE_OR_DASH,
-            help="Write what is seen and decided, one JSON line a frame; -: to standard output.",
+            help="Write what is seen and decided, one JSON line per frame; - writes to standard output.",
         ),
         click.option("--video", type=FILE, help="Write an annotated video (.mp4, .webm or .avi)."),
-        click.option("--quiet", is_flag=True, help="Only the summary."),
+        click.option("--quiet", is_flag=True, help="Print only the summary."),
     )
 
 
@@ -97,7 +97,7 @@ def topic_options(command: Callable[..., None]) -> Callable[..., None]:
         command,
         *(
             click.option(
-                f"--{what}-topic", metavar="TOPIC", help=f"Of a bag: its {what}, if it is not found."
+                f"--{what}-topic", metavar="TOPIC", help=f"Bag: topic of the {what}, if it is not found."
             )
             for what in ("colour", "depth", "odometry")
         ),
@@ -116,10 +116,8 @@ def mission_options(command: Callable[[MissionOptions], None]) -> Callable[..., 
 
     return _in_this_order(
         recording_options(with_options),
-        click.option(
-            "--scenario", help="Simulation only: another world, a YAML file or the name of one that ships."
-        ),
-        click.option("--seed", type=WholeNumber(min=0), help="Simulation only: another seed."),
+        click.option("--scenario", help="Simulation only: a scenario file, or the name of one that ships."),
+        click.option("--seed", type=WholeNumber(min=0), help="Simulation only: the seed of the world."),
         click.option(
             "--record", type=FOLDER, help="Write the frames and the odometry, for `treadwatch replay`."
         ),

@@ -186,7 +186,7 @@ class DecisionMaker:
         held = self._last
         return Reason(
             "release",
-            f"not yet faster after: {held.sentence}",
+            f"waiting to speed up; last limit: {held.sentence}",
             held.obstacle_id,
             limiting.distance_m,
             limiting.closing_mps,
@@ -225,17 +225,17 @@ class DecisionMaker:
 def _unknown(on_floor: float, along: float) -> str:
     """Which input is not finite. on_floor: sum of the pose; along: sum of the path coordinates."""
     if not math.isfinite(on_floor):
-        return "where the robot is is not known"
+        return "the robot's pose is not known"
     if not math.isfinite(along):
-        return "where the robot is on its path is not known"
-    return "how fast the robot is is not known"
+        return "the robot's position on its path is not known"
+    return "the robot's speed is not known"
 
 
 def _reason_for(limit: Limit, speed_mps: float) -> Reason:
     """The limit's reason, if speed_mps is what remains of the limit."""
     reason = limit.reason
     if speed_mps < limit.speed_mps:
-        return replace(reason, sentence=f"{reason.sentence}: too little to go for")
+        return replace(reason, sentence=f"{reason.sentence}, too slow to drive")
     return reason
 
 

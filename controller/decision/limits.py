@@ -126,13 +126,13 @@ def stop_before(
 
 
 def standing_text(clearance_m: float, needed_m: float) -> str:
-    """What something that stands does, for a reason: beside the swept width, how much room it leaves there.
+    """What a standing obstacle does, for a reason: beside the swept width, the clearance that it leaves.
 
-    clearance_m: free floor between it and the swept width. needed_m: from how much on it is passed.
+    clearance_m: free floor between it and the swept width. needed_m: minimum clearance for passing it.
     """
     if not 0.0 < clearance_m < math.inf:
         return "stands on the path"
-    return f"leaves {clearance_m:.2f} m beside the swept width, which needs {needed_m:.2f} m,"
+    return f"leaves {clearance_m:.2f} m beside the swept width ({needed_m:.2f} m needed),"
 
 
 def speed_to_decide_by(commanded_mps: float, measured_mps: float) -> float:

@@ -149,11 +149,11 @@ class MovingLimits:
         along_mps = float(velocities.along_mps[conflict.row])
         leader_stop_m = 0.0
         rule: Rule
-        rule, what = "oncoming", f"comes at {-along_mps:.1f} m/s"
+        rule, what = "oncoming", f"approaches at {-along_mps:.1f} m/s,"
         if along_mps > _DRIVES_AHEAD_MPS:
             leader_mps = along_mps - float(velocities.sigma_along_mps[conflict.row])
             leader_stop_m = max(leader_mps, 0.0) ** 2 / (2.0 * self._config.prediction.leader_decel_mps2)
-            rule, what = "leader", f"drives ahead at {along_mps:.1f} m/s"
+            rule, what = "leader", f"drives the same way at {along_mps:.1f} m/s,"
         elif along_mps > -_DRIVES_AHEAD_MPS:
             rule, what = "crossing", "is on the path"
         gap = Gap(
@@ -181,11 +181,9 @@ class MovingLimits:
         def why() -> Reason:
             ahead_m, waits = conflict.lo_in_m - s_m, stays.reason
             name = Gap(ahead_m, obstacle_id=track_id, unseen_s=float(bodies.unseen_s[conflict.row])).name
-            leaves = (
-                f"until {conflict.out_s:.1f} s from now" if math.isfinite(conflict.out_s) else "and stays"
-            )
+            leaves = f", gone in {conflict.out_s:.1f} s" if math.isfinite(conflict.out_s) else " and stays"
             sentence = (
-                f"{name} crosses {max(ahead_m, 0.0):.1f} m ahead {leaves}: {allowed_text(choice.yield_mps)}"
+                f"{name} crosses {max(ahead_m, 0.0):.1f} m ahead{leaves}: {allowed_text(choice.yield_mps)}"
             )
             return Reason(
                 "crossing", sentence, track_id, ahead_m, waits.closing_mps, waits.required_m, waits.margin_m

@@ -129,7 +129,7 @@ class SpeedLimits:
         limit = stop_before(gap, motion, self._comfort, least_m, -math.inf, "unseen", "")
 
         def why() -> Reason:
-            beyond = f"the floor is not seen to be free beyond {max(gap.distance_m, 0.0):.1f} m: "
+            beyond = f"the floor beyond {max(gap.distance_m, 0.0):.1f} m was not seen free: "
             required_m, margin_m = limit.reason.required_m, limit.reason.margin_m
             return Reason(
                 "unseen",

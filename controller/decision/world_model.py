@@ -167,7 +167,7 @@ class WorldModel:
             return ""
         pose = scene.robot_pose or self._poses.at(scene.captured_ns)
         if pose is None or not pose.finite:
-            return "where the robot was when the scene was taken is not known"
+            return "the robot's pose at the time of the scene is not known"
         try:
             check_scan(scene.free_space)
             seen = bodies_of(scene, pose, self._mount, self._config.prediction.body_depth_m)

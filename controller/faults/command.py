@@ -58,11 +58,14 @@ def describe(trials: list[TrialResult], kills: list[KillResult], kind: str | Non
         "",
         f"Made by `treadwatch faults{f' --processes {kind}' if kind else ''}`.",
         "",
-        "In simulated time, from 0.5 m/s; guard, driver, wire and emulated base. Stood: until the true base",
-        "stood still. By itself: how far it went in 3 s after the cause had gone and 0.5 m/s was still asked",
-        "for. Again: it drove after a zero command and consent.",
+        "In simulated time, from 0.5 m/s, with output guard, driver, link and emulated base.",
         "",
-        "| chassis | fault | mode | reason | stood | way | by itself | again |",
+        "- mode, reason: what the driver reports.",
+        "- stopped after, distance: from the fault until the simulated base stands still.",
+        "- moved by itself: distance in the 3 s after the cause has gone, while 0.5 m/s is still commanded.",
+        "- drives again: after a zero command and a person's consent.",
+        "",
+        "| chassis | fault | mode | reason | stopped after | distance | moved by itself | drives again |",
         "|---|---|---|---|---|---|---|---|",
     ]
     for trial in trials:
@@ -77,9 +80,9 @@ def describe(trials: list[TrialResult], kills: list[KillResult], kind: str | Non
         lines += [
             "",
             f"In real time, three processes ({kind} emulator, control, perception), from 0.3 m/s or more.",
-            "The base tells its speed ten times a second; while it is frozen it tells nothing.",
+            "The emulator prints its speed ten times per second; while it is frozen it prints nothing.",
             "",
-            "| fault | base stood | the mission ended with | exit code |",
+            "| fault | base stood after | the mission ended with | exit code |",
             "|---|---|---|---|",
         ]
     for kill in kills:

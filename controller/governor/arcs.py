@@ -39,7 +39,7 @@ class Kind(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Wish:
+class MotionRequest:
     """A request as a motion of this robot.
 
     speed_mps: along the arc, or of the body's farthest corner in a turn, within the robot's own limits; 0 for
@@ -73,52 +73,53 @@ def _least_radius_by_yaw_m(robot: Robot) -> float:
     return 0.1 / (_YAW_RATE_FOR_THE_BEND * robot.limits.max_yaw_rate_radps)
 
 
-def understand(twist: Twist, robot: Robot) -> Wish:
+def understand(twist: Twist, robot: Robot) -> MotionRequest:
     """The motion that twist asks of this robot."""
     v, w = twist.v_mps, twist.w_radps
     if not (math.isfinite(v) and math.isfinite(w)):
-        return Wish(Kind.REFUSED, why=f"the command is not a number: {v} m/s, {w} rad/s")
+        return MotionRequest(Kind.REFUSED, why=f"the command is not a number: {v} m/s, {w} rad/s")
     if v < -STANDING_MPS:
-        return Wish(Kind.REFUSED, why=f"reverse at {-v:.2f} m/s is refused: the camera does not see behind")
+        why = f"reverse at {-v:.2f} m/s is refused: the camera does not see behind"
+        return MotionRequest(Kind.REFUSED, why=why)
     if v <= STANDING_MPS:
         if abs(w) <= STANDING_RADPS:
-            return Wish(Kind.STAND)
+            return MotionRequest(Kind.STAND)
         yaw_radps = min(abs(w), robot.limits.max_yaw_rate_radps)
-        return Wish(Kind.TURN, yaw_radps * corner_m(robot), left=1 if w > 0.0 else -1)
+        return MotionRequest(Kind.TURN, yaw_radps * corner_m(robot), left=1 if w > 0.0 else -1)
     curvature = w / v
     if abs(curvature) * tightest_m(robot) > 1.0:
-        return Wish(
+        return MotionRequest(
             Kind.REFUSED,
             why=f"a radius of {1.0 / abs(curvature):.2f} m is tighter than this robot can drive "
             f"({tightest_m(robot):.2f} m): ask for a wider arc, or for v = 0 to turn in place",
         )
     yaw_radps = _YAW_RATE_FOR_THE_BEND * robot.limits.max_yaw_rate_radps
     top_mps = min(robot.limits.max_speed_mps, yaw_radps / max(abs(curvature), _STRAIGHT_1PM))
-    return Wish(Kind.ARC, min(v, top_mps), curvature)
+    return MotionRequest(Kind.ARC, min(v, top_mps), curvature)
 
 
-def why_stop(wish: Wish, requested: Twist | None) -> Reason:
-    """Why the robot stops for a wish that asks for no motion, or for another one than the present.
+def stop_reason_of(request: MotionRequest, requested: Twist | None) -> Reason:
+    """Why the robot stops for a request that asks for no motion, or for another one than the present.
 
     requested: None if there is no command.
     """
-    if wish.kind is Kind.REFUSED:
-        return Reason("no command" if requested is None else "refused", f"{wish.why}: stop")
-    if wish.kind is Kind.STAND:
+    if request.kind is Kind.REFUSED:
+        return Reason("no command" if requested is None else "refused", f"{request.why}: stop")
+    if request.kind is Kind.STAND:
         return Reason("requested", "asked to stand")
-    return Reason("requested", f"stands before it can {'turn in place' if wish.left else 'drive on'}")
+    return Reason("requested", f"stands before it can {'turn in place' if request.left else 'drive on'}")
 
 
-def driveable(wish: Wish, v_mps: float, robot: Robot) -> Wish:
-    """The wish, with its curvature limited to what the yaw rate limit allows at v_mps.
+def driveable(request: MotionRequest, v_mps: float, robot: Robot) -> MotionRequest:
+    """The request, with its curvature limited to what the yaw rate limit allows at v_mps.
 
     v_mps: the highest speed that the robot will still reach. If it is too fast for the requested arc, the
     robot slows down on the tightest arc that it can drive at that speed.
     """
     most_1pm = robot.limits.max_yaw_rate_radps / max(v_mps, STANDING_MPS)
-    if abs(wish.curvature_1pm) <= most_1pm:
-        return wish
-    return replace(wish, curvature_1pm=math.copysign(most_1pm, wish.curvature_1pm))
+    if abs(request.curvature_1pm) <= most_1pm:
+        return request
+    return replace(request, curvature_1pm=math.copysign(most_1pm, request.curvature_1pm))
 
 
 def arc_path(pose: PlanarPose, curvature_1pm: float, speed_mps: float, range_m: float, robot: Robot) -> Path:

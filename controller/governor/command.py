@@ -119,7 +119,7 @@ def _drive_text(governing: Governing) -> str:
 
 
 def _commands_text(inbox: Inbox) -> str:
-    text = f"{inbox.accepted} obeyed"
+    text = f"{inbox.accepted} accepted"
     for kind, count in sorted(inbox.dropped.items()):
         text += f", {count} {kind}"
     return text

@@ -24,7 +24,7 @@ from controller.decision.obstacle_boxes import bodies_of
 from controller.decision.situation import SceneError, Situation
 from controller.decision.surfaces import check_scan
 from controller.governor.arc_ahead import ArcAhead
-from controller.governor.arcs import Kind, Wish, corner_m, driveable, understand, why_stop
+from controller.governor.arcs import Kind, MotionRequest, corner_m, driveable, stop_reason_of, understand
 from controller.governor.ground import GroundMemory
 from controller.governor.request import Twist
 from controller.governor.surroundings import GroundLimits
@@ -79,7 +79,7 @@ class SpeedGovernor:
         self._ahead = ArcAhead(self._decide, robot, decision.sight.range_m, _NEAR_EXTRA_M)
         self._poses = PoseHistory()
         # How the robot moves now: kept until it stands, whatever is asked for meanwhile.
-        self._motion = Wish(Kind.STAND)
+        self._motion = MotionRequest(Kind.STAND)
         self._has_moved = False
 
     @property
@@ -95,7 +95,7 @@ class SpeedGovernor:
     def rest(self) -> None:
         """Begin again from standstill: the chassis does not follow setpoints now."""
         self._shape.reset()
-        self._motion = Wish(Kind.STAND)
+        self._motion = MotionRequest(Kind.STAND)
 
     def step(
         self,
@@ -116,12 +116,16 @@ class SpeedGovernor:
         silence: why nothing is requested.
         answer: whether the chassis does what it is told.
         """
-        wish = Wish(Kind.REFUSED, why=silence) if requested is None else understand(requested, self._robot)
+        request = (
+            MotionRequest(Kind.REFUSED, why=silence)
+            if requested is None
+            else understand(requested, self._robot)
+        )
         if pose.finite:
             self._look(scene, pose, now_ns)
-        self._choose_motion(wish)
+        self._choose_motion(request)
         decision = self._decided(scene, pose, measured_mps, now_ns)
-        decision = self._as_asked(decision, wish, requested)
+        decision = self._capped_to_request(decision, request, requested)
         return self._command(decision, answer)
 
     def _look(self, scene: Scene | None, pose: PlanarPose, now_ns: int) -> None:
@@ -146,23 +150,23 @@ class SpeedGovernor:
         standing = self._shape.v_mps == 0.0
         self._ground.look(scene.free_space, then, scene.captured_ns, bodies.select(bodies.moving), standing)
 
-    def _choose_motion(self, wish: Wish) -> None:
+    def _choose_motion(self, request: MotionRequest) -> None:
         """Choose what is driven now.
 
         An arc may change into another arc on the way. Between an arc and a turn in place, and between turns
         in different directions, the robot comes to rest.
         """
         stands = self._shape.v_mps == 0.0 and self._shape.a_mps2 == 0.0
-        if wish.kind is Kind.ARC and (stands or self._motion.kind is Kind.ARC):
+        if request.kind is Kind.ARC and (stands or self._motion.kind is Kind.ARC):
             # It still gets faster until its present acceleration has ended.
             more_mps = max(self._shape.a_mps2, 0.0) ** 2 / (2.0 * self._robot.limits.max_jerk_mps3)
-            self._motion = driveable(wish, self._shape.v_mps + more_mps, self._robot)
-        elif wish.kind is Kind.TURN and (
-            stands or (self._motion.kind is Kind.TURN and self._motion.left == wish.left)
+            self._motion = driveable(request, self._shape.v_mps + more_mps, self._robot)
+        elif request.kind is Kind.TURN and (
+            stands or (self._motion.kind is Kind.TURN and self._motion.left == request.left)
         ):
-            self._motion = wish
+            self._motion = request
         elif stands:
-            self._motion = Wish(Kind.STAND)
+            self._motion = MotionRequest(Kind.STAND)
 
     def _decided(self, scene: Scene | None, pose: PlanarPose, measured_mps: float, now_ns: int) -> Decision:
         """The decision for the present motion, before it is compared with the request."""
@@ -221,16 +225,18 @@ class SpeedGovernor:
             return decision
         return self._with(decision, speed_mps, limit.reason, emergency=decision.emergency or limit.urgent)
 
-    def _as_asked(self, decision: Decision, wish: Wish, requested: Twist | None) -> Decision:
+    def _capped_to_request(
+        self, decision: Decision, request: MotionRequest, requested: Twist | None
+    ) -> Decision:
         """The decision, no faster than asked for, with the request as its reason if that is the limit."""
-        stop = wish.kind in (Kind.STAND, Kind.REFUSED) or wish.kind is not self._motion.kind
-        stop = stop or (wish.kind is Kind.TURN and wish.left != self._motion.left)
+        stop = request.kind in (Kind.STAND, Kind.REFUSED) or request.kind is not self._motion.kind
+        stop = stop or (request.kind is Kind.TURN and request.left != self._motion.left)
         if stop:
-            return self._with(decision, 0.0, why_stop(wish, requested), emergency=decision.emergency)
+            return self._with(decision, 0.0, stop_reason_of(request, requested), emergency=decision.emergency)
         assert requested is not None
-        if wish.kind is Kind.TURN:
+        if request.kind is Kind.TURN:
             return decision
-        target_mps = min(decision.target_speed_mps, wish.speed_mps)
+        target_mps = min(decision.target_speed_mps, request.speed_mps)
         reason = decision.reason
         if reason.rule in ("free", "section"):
             reason = Reason(
@@ -242,7 +248,7 @@ class SpeedGovernor:
                 )
                 reason = Reason("robot", sentence)
         elif reason.rule == "target":
-            reason = Reason("robot", f"such an arc is looked along only so far: {target_mps:.2f} m/s")
+            reason = Reason("robot", f"the arc is checked for a limited distance: {target_mps:.2f} m/s")
         return self._with(decision, target_mps, reason, emergency=decision.emergency)
 
     def _with(self, decision: Decision, target_mps: float, reason: Reason, *, emergency: bool) -> Decision:

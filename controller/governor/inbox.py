@@ -31,7 +31,7 @@ _ROUNDING_S = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class RequestState:
     """What is asked for now.
 
     twist: None if nothing is.
@@ -77,21 +77,21 @@ class Inbox:
         self.dropped: Counter[str] = Counter()
         self.accepted = 0
 
-    def poll(self, now_ns: int) -> Asked:
+    def poll(self, now_ns: int) -> RequestState:
         """Read what has arrived; what is asked for at now_ns."""
         self._end_if_silent(now_ns)
         if not self._lost:
             self._read(now_ns)
         if self._lost:
-            return Asked(None, self._lost)
+            return RequestState(None, self._lost)
         session = self._session
         if session is None:
             if self._heard_ns is None:
-                return Asked(None, "no command yet")
-            return Asked(None, f"no command for {(now_ns - self._heard_ns) // NS_PER_MS} ms")
+                return RequestState(None, "no command yet")
+            return RequestState(None, f"no command for {(now_ns - self._heard_ns) // NS_PER_MS} ms")
         if session.steady_s < self._config.resume_s - _ROUNDING_S:
-            return Asked(None, f"commands have come for only {session.steady_s:.2f} s")
-        return Asked(session.last.twist)
+            return RequestState(None, f"commands have come for only {session.steady_s:.2f} s")
+        return RequestState(session.last.twist)
 
     def tell(self, v_mps: float, w_radps: float, decision: Decision, chassis: str) -> None:
         """Answer the newest message, once."""
@@ -148,7 +148,7 @@ class Inbox:
     ) -> bool:
         if sender != session.sender:
             has = f"{_name(session.sender)} has the command"
-            return self._drop("from another sender", f"{_name(sender)} is not obeyed while {has}")
+            return self._drop("from another sender", f"{_name(sender)} is ignored while {has}")
         if request.seq == session.last.seq:
             return self._drop("duplicate", f"seq {request.seq} came twice")
         if request.seq < session.last.seq:

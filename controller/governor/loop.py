@@ -15,7 +15,7 @@ from controller.decision.decision import Decision
 from controller.driven_base import DrivenBase
 from controller.ending import Ending, Outcome
 from controller.governor.governor import SpeedGovernor
-from controller.governor.inbox import Asked
+from controller.governor.inbox import RequestState
 from controller.localise import Localiser
 from controller.record.recorder import path_ahead
 from hal.api import Chassis
@@ -26,7 +26,7 @@ from vision.scene import Scene
 class Commands(Protocol):
     """Gives requests and takes answers; implemented by controller.governor.inbox.Inbox."""
 
-    def poll(self, now_ns: int) -> Asked: ...
+    def poll(self, now_ns: int) -> RequestState: ...
 
     def tell(self, v_mps: float, w_radps: float, decision: Decision, chassis: str) -> None: ...
 
@@ -94,13 +94,13 @@ class GovernorLoop:
             state, self._ahead(), governed.fault, answer.zero,
         )  # fmt: skip
 
-    def _asked(self, now_ns: int) -> Asked:
+    def _asked(self, now_ns: int) -> RequestState:
         """What the planner asks for; nothing while the drive ends or the chassis does not obey."""
         asked = self._commands.poll(now_ns)
         if not self._base.obeys:
-            return Asked(None, f"the chassis is not armed ({self._mode})")
+            return RequestState(None, f"the chassis is not armed ({self._mode})")
         if self.ending.stop_reason is not None:
-            return Asked(None, self.ending.stop_reason)
+            return RequestState(None, self.ending.stop_reason)
         return asked
 
     def _note_travel(self, pose: PlanarPose) -> None:

@@ -99,7 +99,7 @@ def _number(content: dict[str, object], key: str, most: float) -> float:
     if not math.isfinite(number):
         raise MessageError(f"{key}: must be finite")
     if not abs(number) <= most:
-        raise MessageError(f"{key}: {number:g} is absurd, at most {most:g}")
+        raise MessageError(f"{key}: {number:g} is out of range, at most {most:g}")
     return number
 
 

@@ -104,9 +104,9 @@ def blind_bend_warning(config: AppConfig, config_path: FilePath) -> str | None:
         "" if bend.min_radius_m is None else f"widen it to a radius of {bend.min_radius_m:.1f} m or more, or "
     )
     return (
-        f"{where}: path.segments.{bend.segment}: the camera sees {int(view.degrees)} degrees and not round "
+        f"{where}: path.segments.{bend.segment}: a view of {int(view.degrees)} degrees does not reach round "
         f"this bend of {bend.radius_m:g} m radius: {bend.stop_s_m:.1f} m along the path the robot may wait "
-        f"for ever for floor that it cannot see; {wider}take a camera that sees wider"
+        f"forever for floor that it cannot see; {wider}use a camera with a wider view"
     )
 
 

@@ -14,7 +14,7 @@ from sim.contact import BUILDING, nearest_body
 from sim.world import World
 
 # What the camera errs to the side, on top of margins.lateral_m (README, "Room").
-CAMERA_ERRS_M = 0.10
+CAMERA_ERROR_M = 0.10
 _EVERY_M = 0.1
 _MOST_POSES = 3000
 _MOST_TOLD = 3
@@ -34,10 +34,10 @@ def close_by_warning(config: AppConfig, config_path: FilePath) -> str | None:
     where, _ = path_spec(config, config_path)
     path = build_path(config, config_path)
     world = build_still_world(config, config_path)
-    told = _beside(config, path, world) | _behind_target(config, path, world)
-    if not told:
+    warnings = _beside(config, path, world) | _behind_target(config, path, world)
+    if not warnings:
         return None
-    words = list(told.values())
+    words = list(warnings.values())
     more = f"; and {len(words) - _MOST_TOLD} more" if len(words) > _MOST_TOLD else ""
     return f"{where}: path: {'; '.join(words[:_MOST_TOLD])}{more}"
 
@@ -45,7 +45,7 @@ def close_by_warning(config: AppConfig, config_path: FilePath) -> str | None:
 def _beside(config: AppConfig, path: Path, world: World) -> dict[str, str]:
     """What stands on the path or too near beside it, in the order along the path."""
     lateral_m = config.decision.margins.lateral_m
-    need_m = lateral_m + CAMERA_ERRS_M
+    need_m = lateral_m + CAMERA_ERROR_M
     nearest: dict[str, tuple[float, float]] = {}
     count = min(round(path.length_m / _EVERY_M), _MOST_POSES) + 2
     along_m = np.linspace(0.0, path.length_m, count)

@@ -49,8 +49,8 @@ def run_mission(options: MissionOptions) -> int:
         )
     console = Console(options.quiet, aside=options.observations == STANDARD_OUTPUT)
     require_possible_world(config, options.config_path)
-    for told in (short_arc_warning, close_by_warning, blind_bend_warning, unused_faults_warning):
-        warning = told(config, options.config_path)
+    for warning_of in (short_arc_warning, close_by_warning, blind_bend_warning, unused_faults_warning):
+        warning = warning_of(config, options.config_path)
         if warning is not None:
             console.warning(warning)
     if isinstance(config.runner, LockstepRunner):

@@ -14,10 +14,10 @@ def short_arc_warning(config: AppConfig, config_path: Path) -> str | None:
     if config.path is None and config.simulation is None:
         return None
     where, spec = path_spec(config, config_path)
-    told = [
+    warnings = [
         f"path.segments.{number}: the arc is only {segment.length_m - segment.blend_m:.2f} m long; "
         f"{segment.in_degrees}"
         for number, segment in enumerate(spec.segments)
         if isinstance(segment, ArcSpec) and segment.may_be_in_radians
     ]
-    return f"{where}: {'; '.join(told)}" if told else None
+    return f"{where}: {'; '.join(warnings)}" if warnings else None

@@ -130,7 +130,7 @@ class ObservationFile:
 
     def _failed(self, error: OSError) -> UserError:
         if isinstance(error, BrokenPipeError):
-            return UserError(f"{self._name}: whoever read the observations has gone; name a file for them")
+            return UserError(f"{self._name}: the reader of the observations has gone; write them to a file")
         return UserError(
             f"{self._name}: nothing more can be written ({error.strerror}); make room or name another file"
         )

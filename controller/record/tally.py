@@ -181,7 +181,7 @@ class FrameTally:
         if self.processed == self.captured:
             return ""
         return (
-            f"{self.processed} of the camera's {self.captured} were looked at: perception did not keep up "
+            f"{self.processed} of the camera's {self.captured} were processed: perception did not keep up "
             "(a video or a recording takes time from it), or the camera lost them"
         )
 

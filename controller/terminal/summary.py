@@ -109,7 +109,7 @@ def _target_text(result: MissionResult) -> str:
         target = result.loop.path.pose(result.loop.path.length_m)
         truth = result.simulation.body_pose
         off_m = math.hypot(target.x_m - truth.x_m, target.y_m - truth.y_m)
-        text += f"; truly {length_text(off_m)} from the target point"
+        text += f"; true distance to the target point {length_text(off_m)}"
     return text
 
 

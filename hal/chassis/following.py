@@ -180,7 +180,7 @@ class Following:
         else:
             return ""
         return (
-            f"the base does not follow: it tells of {told} in the {seconds:.1f} s in which {commanded} were "
+            f"the base does not follow: it reports {told} in the {seconds:.1f} s in which {commanded} were "
             "commanded; are its tracks free and its encoders connected?"
         )
 
@@ -208,11 +208,11 @@ def _excess_text(told: str, commanded: str, stood: bool) -> str:
         if stood
         else "are the scales of its speed and of its counters right in chassis:?"
     )
-    return f"the base does not follow: it tells of {told} while at most {commanded} was commanded; {ask}"
+    return f"the base does not follow: it reports {told} while at most {commanded} was commanded; {ask}"
 
 
 def _shortfall_text(reported_mps: float, min_mps: float) -> str:
     return (
-        f"the base does not follow: it tells of {reported_mps:.2f} m/s while at least {min_mps:.2f} m/s was "
+        f"the base does not follow: it reports {reported_mps:.2f} m/s while at least {min_mps:.2f} m/s was "
         "commanded for 3 s; is the scale of its counters right in chassis:, and can its motors go that fast?"
     )

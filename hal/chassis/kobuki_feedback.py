@@ -106,7 +106,7 @@ class KobukiFeedback:
     def command_refusal(self) -> str:
         """A Kobuki always takes commands, so this tells only whether it restarted since it was armed."""
         if not self._setup_requested:
-            return "nobody asked it to"
+            return "it was not asked to"
         return "its clock or its ticks jumped: restarted" if self._restarted else ""
 
     @property

@@ -32,8 +32,8 @@ class OtherMaster:
         """A frame of another host came. The first kind is reported until the bus is free again."""
         self._last_frame_ns = now_ns
         self.sentence = self.sentence or (
-            f"somebody else sends {HOST_FRAMES[arbitration_id]} (0x{arbitration_id:X}) on this bus; stop the "
-            "other program or computer first: a base has one master"
+            f"another sender has sent {HOST_FRAMES[arbitration_id]} (0x{arbitration_id:X}) on this bus; stop "
+            "the other program or computer first: a base has one master"
         )
 
     def step(self, now_ns: int) -> None:

@@ -39,7 +39,7 @@ class RoboclawFeedback(EncoderFeedback):
         """Why the controller must not be driven: its time-out is not what was set, or it restarted; "" if it
         may be."""
         if not self._setup_requested:
-            return "nobody asked it to"
+            return "it was not asked to"
         if self._restarted:
             return "its encoders jumped: restarted"
         if self._timeout_ms == self._config.timeout_ms:

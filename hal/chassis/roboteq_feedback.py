@@ -39,7 +39,7 @@ class RoboteqFeedback(EncoderFeedback):
         """Why the controller must not be driven: its watchdog is not what was set, it restarted, or it
         refuses commands; "" if it may be."""
         if not self._setup_requested:
-            return "nobody asked it to"
+            return "it was not asked to"
         if self._restarted:
             return "its counters jumped: restarted"
         if self._echo_resumed:

@@ -133,7 +133,7 @@ class CanBusLink(ReopeningLink[can.BusABC]):
             return f"the bus is down: `ip link set {self._config.channel} up type can bitrate 500000`"
         if error_number == errno.ENOBUFS or str(error) in (_BUS_OFF, _BUFFER_FULL):
             advice = (
-                "nobody acknowledges: check the base's power, CAN high and low, termination and 500 kbit/s"
+                "no node acknowledges: check the base's power, CAN high and low, termination and 500 kbit/s"
             )
             if self._config.interface == "socketcan" and str(error) == _BUS_OFF:
                 return f"{advice}, then `ip link set {self._config.channel} type can restart`"

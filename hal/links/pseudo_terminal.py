@@ -54,7 +54,7 @@ class PseudoTerminal:
         except OSError as error:
             raise LinkLost(f"pseudo-terminal {self._path}: cannot write ({error.strerror})") from error
         if written != len(data):
-            raise LinkLost(f"pseudo-terminal {self._path}: nobody reads at the other end")
+            raise LinkLost(f"pseudo-terminal {self._path}: no program reads at the other end")
 
     def read(self) -> bytes:
         """See hal.api.SerialLink. Raises LinkLost when unplugged."""

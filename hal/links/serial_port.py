@@ -94,7 +94,7 @@ def _hal_error(error: Exception, config: SerialLinkConfig) -> HalError:
     )
     remedy = f"that the adapter is plugged in ({_describe_ports(_DEVICES)})"
     if not config.url.startswith(f"{_DEVICES}/"):
-        remedy = "that what is to make this port, an emulator for example, runs already"
+        remedy = "that the program which creates this port, for example an emulator, is running"
     return DeviceNotFound(f"{where}: cannot be opened ({cause}); check the url and {remedy}")
 
 

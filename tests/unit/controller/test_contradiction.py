@@ -75,7 +75,7 @@ def test_the_sentence_names_both_motions_and_what_to_look_at() -> None:
     noticed = told_after(0.6, -0.6)
     assert noticed is not None
     assert noticed[1] == (
-        "the camera sees -0.22 m ahead and +0.00 rad where the base tells of +0.22 m and +0.00 rad; do its "
+        "the camera sees -0.22 m ahead and +0.00 rad where the base reports +0.22 m and +0.00 rad; do its "
         "motors turn the right way, are its scales right in chassis:, do its tracks slip?"
     )
 

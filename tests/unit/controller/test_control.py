@@ -156,7 +156,7 @@ def test_a_robot_that_knows_not_where_it_is_stops_and_the_loop_goes_on() -> None
     assert len(taken) == 140
     faults = [index for index, step in enumerate(taken) if step.decision.reason.rule == "fault"]
     assert faults == [100, 101, 102]
-    assert taken[100].decision.reason.sentence == "where the robot is is not known: stop"
+    assert taken[100].decision.reason.sentence == "the robot's pose is not known: stop"
     way_m = sum(PERIOD_S * step.setpoint.v_mps for step in taken[3:-1])
     assert taken[-1].progress_m == pytest.approx(way_m, abs=1e-3), "and it knows again what it has driven"
     assert all(math.isfinite(step.setpoint.v_mps + step.setpoint.w_radps) for step in taken)

@@ -7,8 +7,8 @@ from controller.ending import (
     ARM_TIMEOUT_S,
     REST_MPS,
     REST_RADPS,
+    REST_TIMEOUT_S,
     SETTLE_S,
-    STILL_GOING_S,
     Ending,
     Outcome,
 )
@@ -111,10 +111,10 @@ def test_the_jitter_of_a_counter_is_rest() -> None:
     [
         (
             (0.3, -0.1),
-            "told to stand for 6 s, the base still tells of 0.30 m/s and -0.10 rad/s; does it hold itself "
-            "where it stands, and do its motors obey?",
+            "commanded to stand for 6 s, the base still reports 0.30 m/s and -0.10 rad/s; does it hold "
+            "itself where it stands, and do its motors obey?",
         ),
-        ((math.nan, math.nan), "told to stand for 6 s, the base does not tell how fast it goes"),
+        ((math.nan, math.nan), "commanded to stand for 6 s, the base does not tell how fast it goes"),
     ],
 )
 def test_a_base_that_goes_on_although_it_is_told_to_stand_is_a_fault(
@@ -122,7 +122,7 @@ def test_a_base_that_goes_on_although_it_is_told_to_stand_is_a_fault(
 ) -> None:
     drive = Drive()
     drive.run(1.0, v_mps=0.5)
-    assert drive.run(STILL_GOING_S, arrived=True, told=told) is None
+    assert drive.run(REST_TIMEOUT_S, arrived=True, told=told) is None
     drive.run(PERIOD_S, arrived=True, told=told)
     assert (drive.ending.outcome, drive.ending.stop_reason) == (Outcome.CHASSIS_FAULT, sentence)
     assert len(drive.chassis.stopped_at_ns) == 1

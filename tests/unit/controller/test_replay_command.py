@@ -190,7 +190,7 @@ def test_a_mounting_that_the_recording_knows_better_is_told(
     run_replay(ReplayOptions(recording, "none", config, quiet=True))
     summary = capsys.readouterr().out
     assert ("0.60 m high and tipped by 4.0 degrees, not where" in summary) is told
-    assert re.search(r"decisions   10 keep; of a robot that goes straight ahead", summary)
+    assert re.search(r"decisions   10 keep; for a robot that drives straight ahead", summary)
 
 
 @pytest.mark.parametrize("robots", [True, False])
@@ -204,7 +204,5 @@ def test_a_robot_s_yaml_knows_the_mounting_that_a_recording_does_not_tell(
     used = recorded_mount(config, None)
     assert (None if used is None else used.height_m) == (mount.height_m if robots else None)
     run_replay(ReplayOptions(tmp_path, "auto", path, quiet=True))
-    said = (
-        f"it is that of {path}, {mount.height_m:.2f} m high" if robots else "the floor is looked for in the"
-    )
-    assert f"note        the recording does not tell the camera's mounting: {said}" in capsys.readouterr().out
+    said = f"it is that of {path}, {mount.height_m:.2f} m high" if robots else "the floor is found in the"
+    assert f"note        the recording does not give the camera's mounting: {said}" in capsys.readouterr().out

@@ -22,11 +22,11 @@ from tests.support.chassis_rig import MS, agilex_config, udp_link_config
 from tests.support.wires import open_can_link
 
 RIVALS: dict[str, AgilexMessage] = {
-    "somebody else sends motion commands (0x111) on this bus; stop the other program": MotionCommand(
+    "another sender has sent motion commands (0x111) on this bus; stop the other program": MotionCommand(
         0.4, 0.0
     ),
-    "somebody else sends the control mode (0x421) on this bus": ControlModeCommand(CAN),
-    "somebody else sends clearing of errors (0x441) on this bus": ClearError(0),
+    "another sender has sent the control mode (0x421) on this bus": ControlModeCommand(CAN),
+    "another sender has sent clearing of errors (0x441) on this bus": ClearError(0),
 }
 
 
@@ -107,5 +107,7 @@ def test_two_drivers_on_one_multicast_bus_hear_each_other_and_not_themselves() -
         for k in range(1, 4):
             assert first.exchange(None, 20 * k * MS).mode is ChassisMode.STANDBY
         second.arm(0)
-        assert second.exchange(None, 20 * MS).reason.startswith("somebody else sends motion commands (0x111)")
+        assert second.exchange(None, 20 * MS).reason.startswith(
+            "another sender has sent motion commands (0x111)"
+        )
         assert first.exchange(None, 80 * MS).mode is ChassisMode.STANDBY, "the second has not said a word"

@@ -169,9 +169,9 @@ def test_an_error_in_use_is_a_lost_link_and_the_next_use_opens_anew(bus: FaultyB
         (OSError(errno.ENETDOWN, "Network is down"), "`ip link set can0 up type can bitrate 500000`"),
         (
             OSError(errno.ENOBUFS, "No buffer space available"),
-            "nobody acknowledges: check the base",
+            "no node acknowledges: check the base",
         ),
-        (can.CanOperationError("Transmit buffer full"), "nobody acknowledges"),
+        (can.CanOperationError("Transmit buffer full"), "no node acknowledges"),
         (OSError(errno.ENODEV, "No such device"), "check the adapter, the cable and the power of the base"),
     ],
 )

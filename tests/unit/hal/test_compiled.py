@@ -74,13 +74,13 @@ def test_step_is_compiled_with_a_message_if_it_cannot_be_cached(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A function of no file, for which the compiler finds no place."""
-    monkeypatch.setattr("hal.compiled._told", set())
+    monkeypatch.setattr("hal.compiled._warned", set())
     scope: dict[str, Any] = {}
     exec(compile("def twice(value):\n    return 2.0 * value\n", "<nowhere>", "exec"), scope)
     assert compiled("float64")(scope["twice"])(1.5) == 3.0
     compiled("float64")(scope["twice"])
     told = capsys.readouterr().err
-    assert told.count("cannot be kept") == 1
+    assert told.count("cannot be cached") == 1
     assert "NUMBA_CACHE_DIR" in told
 
 
@@ -179,7 +179,7 @@ def test_cache_is_read_again_and_rebuilt_if_damaged(tmp_path: Path, ending: str,
 def test_a_full_disk_keeps_nothing_and_hinders_nobody(tmp_path: Path) -> None:
     code, answer, told = run_step(tmp_path, most_bytes=200)
     assert (code, answer) == (0, "3.0\n")
-    assert "cannot be kept" in told
+    assert "cannot be cached" in told
     assert "File too large" in told
 
 

@@ -52,7 +52,7 @@ def test_the_sentence_says_what_was_told_and_what_commanded() -> None:
     following = Following()
     seconds_until_told(following, 0.5)
     assert following.sentence == (
-        "the base does not follow: it tells of 0.00 m in the 1.0 s in which 0.50 m were commanded; "
+        "the base does not follow: it reports 0.00 m in the 1.0 s in which 0.50 m were commanded; "
         "are its tracks free and its encoders connected?"
     )
 
@@ -65,7 +65,7 @@ def test_one_dead_encoder_is_a_turn_that_nobody_commanded() -> None:
         following.step(PlanarPose(0.25 * math.sin(heading_rad), 0.0, heading_rad), period * PERIOD_NS)
         following.ordered(Setpoint(period * PERIOD_NS, 0.4, 0.0, 0.0))
     assert following.sentence == (
-        "the base does not follow: it tells of 0.80 rad in the 1.0 s in which 0.00 rad were commanded; "
+        "the base does not follow: it reports 0.80 rad in the 1.0 s in which 0.00 rad were commanded; "
         "are its tracks free and its encoders connected?"
     )
 
@@ -133,7 +133,7 @@ def test_the_sentence_of_a_slow_base_names_both_speeds() -> None:
             break
         following.ordered(Setpoint(period * PERIOD_NS, 1.0, 0.0, 0.0))
     assert following.sentence == (
-        "the base does not follow: it tells of 0.50 m/s while at least 1.00 m/s was commanded for 3 s; "
+        "the base does not follow: it reports 0.50 m/s while at least 1.00 m/s was commanded for 3 s; "
         "is the scale of its counters right in chassis:, and can its motors go that fast?"
     )
 
@@ -158,7 +158,7 @@ def test_the_sentence_names_both_speeds_and_what_to_look_at() -> None:
             break
         following.ordered(Setpoint(period * PERIOD_NS, 1.0, 0.0, 0.0))
     assert following.sentence == (
-        "the base does not follow: it tells of 2.00 m/s while at most 1.00 m/s was commanded; "
+        "the base does not follow: it reports 2.00 m/s while at most 1.00 m/s was commanded; "
         "are the scales of its speed and of its counters right in chassis:?"
     )
 
@@ -207,7 +207,7 @@ def test_the_sentence_of_one_that_runs_away_asks_whether_it_holds_itself() -> No
     noticed = runs_away(0.0, 1.0, 10.0)
     assert noticed is not None
     assert noticed[1] == (
-        "the base does not follow: it tells of 1.00 rad/s while at most 0.00 rad/s was commanded; "
+        "the base does not follow: it reports 1.00 rad/s while at most 0.00 rad/s was commanded; "
         "does it hold itself where it stands, and do its motors obey?"
     )
 

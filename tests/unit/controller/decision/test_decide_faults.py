@@ -67,7 +67,7 @@ def test_a_scene_from_where_nobody_knows_stops() -> None:
     bench = Bench()
     bench.settle()
     nowhere = replace(bench.scene(), robot_pose=PlanarPose(0.0, math.nan, 0.0))
-    assert stops(bench.step(nowhere), "camera", "where the robot was when the scene was taken is not known")
+    assert stops(bench.step(nowhere), "camera", "the robot's pose at the time of the scene is not known")
     assert bench.step(bench.scene()).reason.rule != "camera"
 
 
@@ -93,12 +93,12 @@ def test_time_going_backwards_stops() -> None:
 @pytest.mark.parametrize(
     ("x_m", "d_m", "v_mps", "a_mps2", "word"),
     [
-        (math.nan, 0.0, 1.0, 0.0, "where the robot is"),
+        (math.nan, 0.0, 1.0, 0.0, "the robot's pose"),
         (1.0, 0.8, 1.0, 0.0, "0.80 m beside its path"),
         (1.0, -0.8, 1.0, 0.0, "is 0.80 m beside its path"),
         (1.0, 0.0, -0.2, 0.0, "moves backwards at 0.20 m/s"),
-        (1.0, 0.0, 1.0, math.inf, "how fast"),
-        (1.0, 0.0, math.nan, 0.0, "how fast"),
+        (1.0, 0.0, 1.0, math.inf, "speed is not known"),
+        (1.0, 0.0, math.nan, 0.0, "speed is not known"),
     ],
 )
 def test_an_unknown_state_stops(x_m: float, d_m: float, v_mps: float, a_mps2: float, word: str) -> None:
@@ -151,8 +151,8 @@ def test_robot_does_not_drive_into_a_person_too_near_for_depth() -> None:
 def test_the_pose_and_the_place_on_the_path_are_each_needed() -> None:
     nowhere = PlanarPose(math.nan, 0.0, 0.0)
     for pose, on_path, word in (
-        (nowhere, OnPath(1.0, 0.0, 0.0), "where the robot is is not known"),
-        (PlanarPose(1.0, 0.0, 0.0), OnPath(1.0, math.nan, 0.0), "where the robot is on its path"),
+        (nowhere, OnPath(1.0, 0.0, 0.0), "the robot's pose is not known"),
+        (PlanarPose(1.0, 0.0, 0.0), OnPath(1.0, math.nan, 0.0), "the robot's position on its path"),
     ):
         bench = Bench()
         bench.settle()
@@ -185,7 +185,7 @@ def test_after_a_fault_the_speed_comes_back_as_after_an_obstacle(v_mps: float, d
     decision = bench.step(bench.scene(), 1.0)
     assert decision.target_speed_mps == 0.0
     assert decision.reason.rule == "release"
-    assert decision.reason.sentence == f"not yet faster after: {fault.sentence}"
+    assert decision.reason.sentence == f"waiting to speed up; last limit: {fault.sentence}"
 
 
 def test_fault_at_rest_does_not_count_as_a_decrease() -> None:

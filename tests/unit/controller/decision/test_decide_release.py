@@ -138,7 +138,8 @@ def test_held_back_it_says_by_what() -> None:
     decision = bench.step(bench.scene(), 1.0)
     assert decision.reason.rule == "release"
     assert decision.reason.obstacle_id == 5
-    assert decision.reason.sentence.startswith("not yet faster after: obstacle 5 stands on the path")
+    told = "waiting to speed up; last limit: obstacle 5 stands on the path"
+    assert decision.reason.sentence.startswith(told)
     assert decision.target_speed_mps < 1.5
 
 
@@ -155,9 +156,9 @@ def test_hold_names_the_obstacle_that_was_there_last() -> None:
 def test_too_little_to_go_for_is_said() -> None:
     decision = Bench().settle(obstacle(0.51 + 0.45 + 0.1 + 0.1, 0.0), v_mps=0.0)
     assert decision.target_speed_mps == 0.0
-    assert decision.reason.sentence.endswith("too little to go for")
+    assert decision.reason.sentence.endswith("too slow to drive")
     moving = Bench().settle(obstacle(3.0, 0.0), v_mps=0.5)
-    assert not moving.reason.sentence.endswith("too little to go for")
+    assert not moving.reason.sentence.endswith("too slow to drive")
 
 
 def test_a_start_needs_more_room_than_going_on() -> None:
@@ -180,7 +181,7 @@ def test_robot_does_not_start_at_creep_speed_beside_a_body() -> None:
     near = obstacle(1.0, 0.7, vx_mps=0.5, vy_mps=-0.4, sigma_mps=0.05)
     decision = Bench().settle(near, v_mps=0.0)
     assert decision.reason.rule == "worst case"
-    assert "at most 0.25 m/s: too little to go for" in decision.reason.sentence
+    assert "at most 0.25 m/s, too slow to drive" in decision.reason.sentence
     assert decision.target_speed_mps == 0.0
 
 

@@ -55,7 +55,7 @@ def test_standing_is_never_urgent() -> None:
 
 def test_text_of_a_body_beside_the_path_states_its_room_and_the_need() -> None:
     assert standing_text(-0.1, 0.2) == standing_text(math.inf, 0.2) == "stands on the path"
-    assert standing_text(0.12, 0.2) == "leaves 0.12 m beside the swept width, which needs 0.20 m,"
+    assert standing_text(0.12, 0.2) == "leaves 0.12 m beside the swept width (0.20 m needed),"
 
 
 def test_an_oncoming_obstacle_needs_more() -> None:

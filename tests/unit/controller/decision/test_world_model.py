@@ -127,7 +127,7 @@ def test_scene_without_a_known_pose_is_not_taken_in(unknown: PlanarPose) -> None
     bench.settle()
     decision = bench.step(replace(bench.scene(), robot_pose=unknown))
     assert decision.target_speed_mps == 0.0
-    assert "where the robot was when the scene was taken is not known" in decision.reason.sentence
+    assert "the robot's pose at the time of the scene is not known" in decision.reason.sentence
 
 
 @pytest.mark.parametrize(("fps", "period_s"), [(15.0, 1.0 / 15.0), (None, 1.0 / 30.0)])

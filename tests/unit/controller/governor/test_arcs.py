@@ -5,13 +5,13 @@ import pytest
 from config.robot import Limits, Robot
 from controller.governor.arcs import (
     Kind,
-    Wish,
+    MotionRequest,
     arc_path,
     corner_m,
     driveable,
+    stop_reason_of,
     tightest_m,
     understand,
-    why_stop,
 )
 from controller.governor.request import Twist
 from hal.types import PlanarPose
@@ -24,27 +24,27 @@ def test_the_corner_of_the_body() -> None:
 
 
 @pytest.mark.parametrize(
-    ("twist", "wish"),
+    ("twist", "asked"),
     [
-        (Twist(0.0, 0.0), Wish(Kind.STAND)),
-        (Twist(-0.004, 0.004), Wish(Kind.STAND)),
-        (Twist(0.5, 0.0), Wish(Kind.ARC, 0.5, 0.0)),
-        (Twist(0.5, 0.25), Wish(Kind.ARC, 0.5, 0.5)),
-        (Twist(0.5, 5e-6), Wish(Kind.ARC, 0.5, 1e-5)),
-        (Twist(0.5, -0.25), Wish(Kind.ARC, 0.5, -0.5)),
+        (Twist(0.0, 0.0), MotionRequest(Kind.STAND)),
+        (Twist(-0.004, 0.004), MotionRequest(Kind.STAND)),
+        (Twist(0.5, 0.0), MotionRequest(Kind.ARC, 0.5, 0.0)),
+        (Twist(0.5, 0.25), MotionRequest(Kind.ARC, 0.5, 0.5)),
+        (Twist(0.5, 5e-6), MotionRequest(Kind.ARC, 0.5, 1e-5)),
+        (Twist(0.5, -0.25), MotionRequest(Kind.ARC, 0.5, -0.5)),
         # The robot's own limits: speed, and 80 % of the yaw rate of 0.8 rad/s.
-        (Twist(3.0, 0.3), Wish(Kind.ARC, 1.5, 0.1)),
-        (Twist(1.0, 1.0), Wish(Kind.ARC, 0.64, 1.0)),
-        (Twist(0.0, 0.5), Wish(Kind.TURN, 0.5 * corner_m(ROBOT), left=1)),
-        (Twist(0.0, -9.0), Wish(Kind.TURN, 0.8 * corner_m(ROBOT), left=-1)),
+        (Twist(3.0, 0.3), MotionRequest(Kind.ARC, 1.5, 0.1)),
+        (Twist(1.0, 1.0), MotionRequest(Kind.ARC, 0.64, 1.0)),
+        (Twist(0.0, 0.5), MotionRequest(Kind.TURN, 0.5 * corner_m(ROBOT), left=1)),
+        (Twist(0.0, -9.0), MotionRequest(Kind.TURN, 0.8 * corner_m(ROBOT), left=-1)),
     ],
 )
-def test_twist_gives_its_kind_speed_and_curvature(twist: Twist, wish: Wish) -> None:
+def test_twist_gives_its_kind_speed_and_curvature(twist: Twist, asked: MotionRequest) -> None:
     understood = understand(twist, ROBOT)
-    assert understood.kind is wish.kind
-    assert understood.speed_mps == pytest.approx(wish.speed_mps)
-    assert understood.curvature_1pm == pytest.approx(wish.curvature_1pm)
-    assert understood.left == wish.left
+    assert understood.kind is asked.kind
+    assert understood.speed_mps == pytest.approx(asked.speed_mps)
+    assert understood.curvature_1pm == pytest.approx(asked.curvature_1pm)
+    assert understood.left == asked.left
 
 
 @pytest.mark.parametrize(
@@ -57,9 +57,9 @@ def test_twist_gives_its_kind_speed_and_curvature(twist: Twist, wish: Wish) -> N
     ],
 )
 def test_bad_twist_is_refused_with_its_reason(twist: Twist, why: str) -> None:
-    wish = understand(twist, ROBOT)
-    assert (wish.kind, wish.speed_mps) == (Kind.REFUSED, 0.0)
-    assert why in wish.why
+    asked = understand(twist, ROBOT)
+    assert (asked.kind, asked.speed_mps) == (Kind.REFUSED, 0.0)
+    assert why in asked.why
 
 
 def test_every_arc_that_is_not_refused_can_be_laid_out() -> None:
@@ -67,14 +67,14 @@ def test_every_arc_that_is_not_refused_can_be_laid_out() -> None:
         robot = Robot(limits=Limits(max_yaw_rate_radps=yaw))
         tightest = 1.0 / tightest_m(robot)
         for curvature in (0.0, 1e-4, -0.01, 0.3, -1.0, 0.999 * tightest, -0.999 * tightest):
-            wish = understand(Twist(0.5, 0.5 * curvature), robot)
-            if wish.kind is Kind.REFUSED:
+            asked = understand(Twist(0.5, 0.5 * curvature), robot)
+            if asked.kind is Kind.REFUSED:
                 assert abs(curvature) > tightest
                 continue
-            path = arc_path(PlanarPose(1.0, 2.0, 3.0), wish.curvature_1pm, wish.speed_mps, 10.0, robot)
-            assert path.curvature(0.01) == pytest.approx(wish.curvature_1pm)
+            path = arc_path(PlanarPose(1.0, 2.0, 3.0), asked.curvature_1pm, asked.speed_mps, 10.0, robot)
+            assert path.curvature(0.01) == pytest.approx(asked.curvature_1pm)
             assert path.start.heading_rad == pytest.approx(3.0)
-            assert path.speed_limit(0.0) == pytest.approx(wish.speed_mps)
+            assert path.speed_limit(0.0) == pytest.approx(asked.speed_mps)
 
 
 def test_an_arc_is_looked_along_as_far_as_the_camera_sees_but_not_round_in_a_circle() -> None:
@@ -87,23 +87,28 @@ def test_an_arc_is_looked_along_as_far_as_the_camera_sees_but_not_round_in_a_cir
 
 
 def test_at_speed_an_arc_is_only_as_tight_as_the_yaw_rate_admits() -> None:
-    wish = understand(Twist(0.4, -0.8), ROBOT)
-    assert wish.curvature_1pm == pytest.approx(-2.0)
-    assert driveable(wish, 0.2, ROBOT) == wish
-    assert driveable(wish, 1.0, ROBOT).curvature_1pm == pytest.approx(-0.8)
-    assert driveable(wish, 1.0, ROBOT).speed_mps == wish.speed_mps
+    asked = understand(Twist(0.4, -0.8), ROBOT)
+    assert asked.curvature_1pm == pytest.approx(-2.0)
+    assert driveable(asked, 0.2, ROBOT) == asked
+    assert driveable(asked, 1.0, ROBOT).curvature_1pm == pytest.approx(-0.8)
+    assert driveable(asked, 1.0, ROBOT).speed_mps == asked.speed_mps
 
 
 @pytest.mark.parametrize(
-    ("wish", "requested", "rule", "sentence"),
+    ("asked", "requested", "rule", "sentence"),
     [
-        (Wish(Kind.REFUSED, why="silence"), None, "no command", "silence: stop"),
-        (Wish(Kind.REFUSED, why="reverse"), Twist(-1.0, 0.0), "refused", "reverse: stop"),
-        (Wish(Kind.STAND), Twist(0.0, 0.0), "requested", "asked to stand"),
-        (Wish(Kind.TURN, 0.3, left=-1), Twist(0.0, -0.5), "requested", "stands before it can turn in place"),
-        (Wish(Kind.ARC, 0.5), Twist(0.5, 0.0), "requested", "stands before it can drive on"),
+        (MotionRequest(Kind.REFUSED, why="silence"), None, "no command", "silence: stop"),
+        (MotionRequest(Kind.REFUSED, why="reverse"), Twist(-1.0, 0.0), "refused", "reverse: stop"),
+        (MotionRequest(Kind.STAND), Twist(0.0, 0.0), "requested", "asked to stand"),
+        (
+            MotionRequest(Kind.TURN, 0.3, left=-1),
+            Twist(0.0, -0.5),
+            "requested",
+            "stands before it can turn in place",
+        ),
+        (MotionRequest(Kind.ARC, 0.5), Twist(0.5, 0.0), "requested", "stands before it can drive on"),
     ],
 )
-def test_why_the_robot_stops(wish: Wish, requested: Twist | None, rule: str, sentence: str) -> None:
-    reason = why_stop(wish, requested)
+def test_why_the_robot_stops(asked: MotionRequest, requested: Twist | None, rule: str, sentence: str) -> None:
+    reason = stop_reason_of(asked, requested)
     assert (reason.rule, reason.sentence) == (rule, sentence)

@@ -9,7 +9,7 @@ import pytest
 
 from config.governor import GovernorConfig
 from controller.decision.decision import Action, Decision, Reason
-from controller.governor.inbox import Asked, Inbox
+from controller.governor.inbox import Inbox, RequestState
 from controller.governor.request import Twist
 from hal.errors import LinkLost
 from hal.types import Sender
@@ -60,18 +60,18 @@ class Talk:
         content = {"seq": seq, "t_s": t_ms / 1e3, "v_mps": v_mps, "w_radps": 0.1} | more
         self.wire.arriving.append((json.dumps(content).encode(), sender))
 
-    def poll(self, now_ms: int) -> Asked:
+    def poll(self, now_ms: int) -> RequestState:
         return self.inbox.poll(now_ms * MS)
 
 
 def test_nothing_before_the_first_command_then_the_newest_one_holds_until_the_time_out() -> None:
     talk = Talk()
-    assert talk.poll(0) == Asked(None, "no command yet")
+    assert talk.poll(0) == RequestState(None, "no command yet")
     talk.say(1, 1000, 0.3)
     talk.say(2, 1010, 0.4)
-    assert talk.poll(20) == Asked(Twist(0.4, 0.1))
-    assert talk.poll(270) == Asked(Twist(0.4, 0.1))
-    assert talk.poll(271) == Asked(None, "no command for 251 ms")
+    assert talk.poll(20) == RequestState(Twist(0.4, 0.1))
+    assert talk.poll(270) == RequestState(Twist(0.4, 0.1))
+    assert talk.poll(271) == RequestState(None, "no command for 251 ms")
     assert (talk.inbox.accepted, talk.warnings) == (2, [])
 
 
@@ -81,9 +81,9 @@ def test_after_silence_commands_must_come_again_for_a_while() -> None:
         talk.say(k, 20 * k)
         asked = talk.poll(20 * k)
         assert (asked.twist is None) == (20 * k < 100)
-    assert talk.poll(400) == Asked(None, "no command for 300 ms")
+    assert talk.poll(400) == RequestState(None, "no command for 300 ms")
     talk.say(9, 420)
-    assert talk.poll(420) == Asked(None, "commands have come for only 0.00 s")
+    assert talk.poll(420) == RequestState(None, "commands have come for only 0.00 s")
     for k in range(1, 6):
         talk.say(9 + k, 420 + 20 * k)
         assert (talk.poll(420 + 20 * k).twist is None) == (k < 5)
@@ -104,7 +104,7 @@ def test_two_commands_far_apart_do_not_keep_coming_and_three_do() -> None:
     talk.say(1, 0)
     talk.poll(0)
     talk.say(2, 1000)
-    assert talk.poll(1000) == Asked(None, "commands have come for only 0.10 s")
+    assert talk.poll(1000) == RequestState(None, "commands have come for only 0.10 s")
     assert talk.poll(1900).twist is None
     talk.say(3, 2000)
     assert talk.poll(2000).twist == Twist(0.5, 0.1)
@@ -151,7 +151,7 @@ def test_rubbish_is_dropped_with_its_reason() -> None:
     talk = Talk()
     talk.wire.arriving.append((b"\xff", PLANNER))
     talk.say(1, 0, x=1)
-    assert talk.poll(0) == Asked(None, "no command yet")
+    assert talk.poll(0) == RequestState(None, "no command yet")
     assert talk.inbox.dropped == {"malformed": 2}
     assert len(talk.warnings) == 1
     assert "10.0.0.1:5000 sent not JSON" in talk.warnings[0]
@@ -163,7 +163,7 @@ def test_one_planner_at_a_time() -> None:
     talk.say(900, 0, 0.9, OTHER)
     assert talk.poll(0).twist == Twist(0.4, 0.1)
     assert talk.inbox.dropped == {"from another sender": 1}
-    assert "10.0.0.2:5000 is not obeyed while 10.0.0.1:5000 has the command" in talk.warnings[0]
+    assert "10.0.0.2:5000 is ignored while 10.0.0.1:5000 has the command" in talk.warnings[0]
     # The first one falls silent: then the other one is heard.
     assert talk.poll(300).twist is None
     talk.say(901, 300, 0.9, OTHER)
@@ -279,8 +279,8 @@ def test_a_socket_that_breaks_is_silence_for_good() -> None:
     talk.say(3, 0)
     assert talk.poll(0).twist is not None
     talk.wire.broken = True
-    assert talk.poll(20) == Asked(None, "the socket broke")
+    assert talk.poll(20) == RequestState(None, "the socket broke")
     talk.wire.broken = False
     talk.say(4, 40)
-    assert talk.poll(40) == Asked(None, "the socket broke")
+    assert talk.poll(40) == RequestState(None, "the socket broke")
     assert talk.warnings == ["the socket broke"]

@@ -16,7 +16,7 @@ from controller.build_chassis import build_base
 from controller.control import ControlStep
 from controller.decision.decision import Decision
 from controller.governor.build import build_governor_loop
-from controller.governor.inbox import Asked
+from controller.governor.inbox import RequestState
 from controller.governor.request import Twist
 from controller.lockstep import run_lockstep
 from controller.record.tally import SetpointTally
@@ -26,8 +26,8 @@ from hal.clocks import SimulatedClock
 class LeftBend:
     """Asks for one arc, always."""
 
-    def poll(self, now_ns: int) -> Asked:
-        return Asked(Twist(0.7, 0.07))
+    def poll(self, now_ns: int) -> RequestState:
+        return RequestState(Twist(0.7, 0.07))
 
     def tell(self, v_mps: float, w_radps: float, decision: Decision, chassis: str) -> None:
         return None

@@ -17,7 +17,7 @@ from controller.control import ControlStep
 from controller.decision.decision import Decision
 from controller.ending import ARM_TIMEOUT_S, Outcome
 from controller.governor.governor import SpeedGovernor
-from controller.governor.inbox import Asked
+from controller.governor.inbox import RequestState
 from controller.governor.loop import GovernorLoop
 from controller.governor.request import Twist
 from controller.localise import Localiser
@@ -29,17 +29,17 @@ from tests.support.scenes import ORIGIN, free_space, scene
 PERIOD_NS = round(PERIOD_S * 1e9)
 ROBOT = Robot()
 MOUNT = CameraMount(0.45, 0.0, 0.6, 0.07)
-GO = Asked(Twist(0.6, 0.1))
+GO = RequestState(Twist(0.6, 0.1))
 
 
 class Planner:
     """controller.governor.loop.Commands: asks by the time, notes what it is told."""
 
-    def __init__(self, asks: Callable[[float], Asked]) -> None:
+    def __init__(self, asks: Callable[[float], RequestState]) -> None:
         self._asks = asks
         self.told: list[tuple[float, float, str, str]] = []
 
-    def poll(self, now_ns: int) -> Asked:
+    def poll(self, now_ns: int) -> RequestState:
         return self._asks(now_ns / 1e9)
 
     def tell(self, v_mps: float, w_radps: float, decision: Decision, chassis: str) -> None:
@@ -49,7 +49,7 @@ class Planner:
 class Rig:
     def __init__(
         self,
-        asks: Callable[[float], Asked] = lambda _: GO,
+        asks: Callable[[float], RequestState] = lambda _: GO,
         arms_after: int = 3,
         chassis: ObedientChassis | None = None,
     ) -> None:
@@ -136,7 +136,7 @@ def test_the_planner_is_told_what_really_went_out() -> None:
 
 
 def test_silence_is_a_jerk_limited_stop_and_no_end() -> None:
-    rig = Rig(lambda t: Asked(None, "no command for 251 ms") if 3.0 <= t < 6.0 else GO)
+    rig = Rig(lambda t: RequestState(None, "no command for 251 ms") if 3.0 <= t < 6.0 else GO)
     steps = rig.run(9.0)
     assert not rig.loop.finished
     assert steps[150].decision.reason.sentence == "no command for 251 ms: stop"
@@ -163,8 +163,8 @@ def test_a_base_that_never_arms_is_given_up() -> None:
     assert steps[-1].now_ns == pytest.approx((ARM_TIMEOUT_S + 0.02) * 1e9, abs=3e7)
 
 
-@pytest.mark.parametrize("asked", [GO, Asked(Twist(0.0, 0.5))])
-def test_a_requested_stop_comes_to_rest_whatever_is_asked_and_ends(asked: Asked) -> None:
+@pytest.mark.parametrize("asked", [GO, RequestState(Twist(0.0, 0.5))])
+def test_a_requested_stop_comes_to_rest_whatever_is_asked_and_ends(asked: RequestState) -> None:
     rig = Rig(lambda _: asked)
     rig.run(3.0)
     rig.loop.request_stop("SIGTERM received")
@@ -208,7 +208,7 @@ def test_a_base_that_fell_behind_is_told_zero_and_begins_again_gently() -> None:
 
 @pytest.mark.parametrize("gain", [2.0, 6.0])
 def test_a_base_that_runs_away_is_not_told_to_go_faster(gain: float) -> None:
-    rig = Rig(lambda _: Asked(Twist(1.0, 0.0)), chassis=RunningAway(gain))
+    rig = Rig(lambda _: RequestState(Twist(1.0, 0.0)), chassis=RunningAway(gain))
     held = [one.setpoint.v_mps for one in rig.run(6.0)][-100:]
     assert max(held) - min(held) < 0.01
     assert 0.0 < held[-1] < 0.45

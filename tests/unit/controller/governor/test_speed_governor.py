@@ -218,7 +218,7 @@ def test_a_scene_from_where_nobody_knows_stops_it_and_spoils_nothing() -> None:
     steps = GovernedDrive(always(0.8), alter=alter).run(9.0)
     unknown = [one.governed.decision for one in after(steps, 4.1) if one.t_s < 4.3]
     assert {one.reason.sentence for one in unknown} == {
-        "where the robot was when the scene was taken is not known: stop"
+        "the robot's pose at the time of the scene is not known: stop"
     }
     assert {one.target_speed_mps for one in unknown} == {0.0}
     assert steps[-1].governed.v_mps > 0.5

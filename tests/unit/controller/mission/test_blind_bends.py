@@ -62,10 +62,10 @@ def test_a_tight_half_turn_is_named_with_what_would_do(tmp_path: Path) -> None:
     told = warning(hall(tmp_path, 1.5, 180.0))
     assert told is not None
     assert told.startswith(
-        "hall.yaml: path.segments.1: the camera sees 69 degrees and not round this bend of "
+        "hall.yaml: path.segments.1: a view of 69 degrees does not reach round this bend of "
     )
     assert "1.5 m radius: 5." in told
-    assert "widen it to a radius of 1.7 m or more, or take a camera that sees wider" in told
+    assert "widen it to a radius of 1.7 m or more, or use a camera with a wider view" in told
     assert warning(hall(tmp_path, 1.7, 180.0)) is None
     assert warning(hall(tmp_path, 1.5, -180.0)) is not None
 
@@ -79,7 +79,7 @@ def test_a_narrower_camera_needs_wider_bends(tmp_path: Path) -> None:
     assert warning(hall(tmp_path, 1.8, 180.0)) is None
     told = warning(hall(tmp_path, 1.8, 180.0, width=640))
     assert told is not None
-    assert "sees 55 degrees" in told
+    assert "a view of 55 degrees" in told
 
 
 def test_a_bend_in_the_middle_of_a_long_path_is_found_where_it_is() -> None:

@@ -142,7 +142,7 @@ def test_a_reader_that_leaves_is_told_in_one_line() -> None:
         told = process.stderr.read()
         assert process.wait(timeout=120) == 2
     assert told == (
-        "treadwatch: standard output: whoever read the observations has gone; name a file for them\n"
+        "treadwatch: standard output: the reader of the observations has gone; write them to a file\n"
     )
 
 

@@ -158,7 +158,7 @@ def test_frames_that_were_not_looked_at_are_told_and_a_camera_that_begins_anew_l
         frames.add(sequence)
     assert (frames.processed, frames.captured, frames.line()) == (5, 5, "")
     frames.add(4)
-    assert frames.line().startswith("6 of the camera's 8 were looked at: perception did not keep up")
+    assert frames.line().startswith("6 of the camera's 8 were processed: perception did not keep up")
 
 
 def test_zero_to_a_base_that_stands_though_it_was_told_to_go_breaks_no_limit() -> None:

@@ -91,7 +91,7 @@ def test_frames_that_were_left_out_are_told_and_otherwise_nothing_is() -> None:
     assert "frames" not in dict(summary_rows(config, result))
     for sequence in (1, 4):
         result.frames.add(sequence)
-    assert dict(summary_rows(config, result))["frames"].startswith("2 of the camera's 4 were looked at")
+    assert dict(summary_rows(config, result))["frames"].startswith("2 of the camera's 4 were processed")
 
 
 def test_a_mission_that_gets_on_says_nothing_of_standing(capsys: pytest.CaptureFixture[str]) -> None:
