@@ -20,6 +20,7 @@ from vision.bodies import (
     division,
     grounding,
     grouping,
+    left_behind,
     masks,
     merging,
     report,
@@ -140,6 +141,7 @@ class Tracker:
         measured = regions.measure(grid, labels, len(tracks))
         known = len(tracks)
         carved = carving.carve(tracks, detection, labels, measured, changes, velocities, self._config)
+        carved = left_behind.part(tracks, detection, above_floor, carved, measured, self._free, self._config)
         tracks.border_is_guess[known:] = tracks.mover[known:]
         if carved is not labels:
             measured = regions.measure(grid, carved, len(tracks))

@@ -10,6 +10,7 @@ Files, in the order in which they come into play within one frame (vision/tracke
 * births - new tracks for large parts that no track claims.
 * carving - suspects: possible movers, cut out of a larger track.
 * ends - the cells close to the end points of fragments; used by carving.
+* left_behind - furniture that a mover has left is parted from its track.
 * grounding - a mover is extended down to the floor.
 * merging - two tracks that are one body are joined.
 * division - one track that holds two bodies is divided.

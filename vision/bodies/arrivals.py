@@ -25,8 +25,8 @@ from vision.depth.depth_grid import BoolGrid, DepthGrid, FloatGrid
 from vision.numerics.relative_pose import NEAREST_M, Row, coordinate_m, relative_row
 
 # Every second view at 30 frames a second is kept. A look back takes the view closest to the wanted time.
-_KEEP_EVERY_S = 0.06
-# Time for which views are kept. So long may the surface of something that has come to rest count as arrived.
+_KEEP_EVERY_S, _KEPT_FOR_S = 0.06, 1.2
+# For so long may the surface of something that has come to rest count as arrived.
 ARRIVED_UP_TO_S = 0.9
 _OLDEST = 1.5  # of the wanted time of a look back: an older view does not serve
 # In the longer time, 0.6 s, a walking person moves by more than his own width. In the shorter time less error
@@ -38,6 +38,7 @@ _SIGMAS = 3.5  # of the difference compared: exceeded by chance in 2 of 10000 ce
 # over 25 cells of four samples each, and neighbours share their noise. Within one frame, for heights over the
 # floor, the factor is CELL_HEIGHT_NOISE (vision/depth/depth_grid.py).
 _CELL_NOISE_OVER_TIME = 0.55
+_SURELY = 0.5  # share of the margin within which a surface surely is the same
 _NEIGHBOURS = 5  # at least this many of a cell and its eight neighbours must have arrived
 # Of one surface: fewer arrived cells, or a smaller share of it, come and go with noise at a rim. A walking
 # person arrives with one side.
@@ -59,6 +60,7 @@ class _Memory:
     stamp_ns: int
     pose: Pose
     nearest_inverse: FloatGrid  # 1/m, of the nearest surface in 3x3 cells; _UNKNOWN where not measured
+    inverse: FloatGrid  # 1/m, of the surface in the cell itself; 0 where not measured
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -97,11 +99,26 @@ class ViewMemory:
             memory = self._memory_of(now_ns, wanted_s)
             if memory is None:
                 continue
-            nearer, same = self._compare(grid, mask, pose, memory)
+            nearer, same = self._compare(grid, mask, pose, memory.pose, memory.nearest_inverse)
             arrived |= nearer
             if wanted_s == _LOOK_BACK_S[-1]:
                 stayed, stayed_s = same, (now_ns - memory.stamp_ns) * 1e-9
         return Changes(*_in_company(arrived, np.flatnonzero(arrived)), stayed, stayed_s)
+
+    def stayed(
+        self, grid: DepthGrid, mask: BoolGrid, pose: Pose, now_ns: int, wanted_s: float
+    ) -> tuple[BoolGrid, float]:
+        """Cells of mask (h, w) whose surface was surely at this place about wanted_s ago; how long ago.
+
+        Half of the margin of changes, and the majority of neighbours: a person 0.2 m before a wall is told
+        from it up to 3.5 m away. No cells, and 0.0 s, if there is no view of that time.
+        """
+        memory = self._memory_of(now_ns, wanted_s)
+        if memory is None:
+            return np.zeros(mask.shape, np.bool_), 0.0
+        _, same = self._compare(grid, mask, pose, memory.pose, memory.inverse, _SURELY)
+        same, _ = _in_company(same, np.flatnonzero(same))
+        return same, (now_ns - memory.stamp_ns) * 1e-9
 
     def resolves_m(self, distance_m: FloatArray) -> FloatArray:
         """(N,) minimum difference in depth at which two surfaces at distance_m (N,) can be distinguished."""
@@ -118,8 +135,8 @@ class ViewMemory:
         # Where the measured depth is beyond the range, space was seen free up to the range, no farther.
         nearest[grid.beyond] = np.float32(1.0 / grid.range_m)
         cv2.dilate(nearest, _BLOCK, nearest)
-        self._memories.append(_Memory(now_ns, pose, nearest))
-        horizon_ns = now_ns - int(1e9 * ARRIVED_UP_TO_S)
+        self._memories.append(_Memory(now_ns, pose, nearest, grid.inverse_depth))
+        horizon_ns = now_ns - int(1e9 * _KEPT_FOR_S)
         self._memories = [m for m in self._memories if m.stamp_ns >= horizon_ns]
 
     def _memory_of(self, now_ns: int, wanted_s: float) -> _Memory | None:
@@ -132,13 +149,21 @@ class ViewMemory:
         return best
 
     def _compare(
-        self, grid: DepthGrid, mask: BoolGrid, pose: Pose, memory: _Memory
+        self,
+        grid: DepthGrid,
+        mask: BoolGrid,
+        pose: Pose,
+        old_pose: Pose,
+        seen_inverse: FloatGrid,
+        margin: float = 1.0,
     ) -> tuple[BoolGrid, BoolGrid]:
-        """(h, w) cells of mask nearer than the surface in memory; and (h, w) those at it, within noise."""
+        """(h, w) cells of mask nearer than the surface seen from old_pose; and those at it, within noise.
+
+        seen_inverse (h, w): 1/m, of that surface. margin: as a share of the usual one.
+        """
         sigma_1pm = math.sqrt(2.0) * _CELL_NOISE_OVER_TIME * self._noise.quadratic_per_m
-        return _compared(
-            grid, mask, pose, memory.pose, memory.nearest_inverse, np.float32(_SIGMAS) * np.float32(sigma_1pm)
-        )
+        margin_m, noise_1pm = np.float32(margin * _MARGIN_M), np.float32(margin * _SIGMAS * sigma_1pm)
+        return _compared(grid, mask, pose, old_pose, seen_inverse, margin_m, noise_1pm)
 
 
 @inlined
@@ -166,13 +191,14 @@ def _project_row(
         cell[j] = np.int32(v) * columns + np.int32(u) if inside else np.int32(-1)
 
 
-@compiled(DepthGrid, "boolean[:, ::1]", Pose, Pose, "float32[:, ::1], float32")
+@compiled(DepthGrid, "boolean[:, ::1]", Pose, Pose, "float32[:, ::1], float32, float32")
 def _compared(
     grid: DepthGrid,
     mask: BoolGrid,
     pose: Pose,
     old_pose: Pose,
     seen_inverse: FloatGrid,
+    margin_m: np.float32,
     noise_1pm: np.float32,
 ) -> tuple[BoolGrid, BoolGrid]:
     """As _compare. pose: of the camera now; old_pose: when seen_inverse (h, w) was seen."""
@@ -191,7 +217,7 @@ def _compared(
         for j in range(width):
             if mask[i, j] and cell[j] >= 0:
                 ahead = inverse[j] - seen[cell[j]]
-                margin = np.float32(_MARGIN_M) * inverse[j] * inverse[j] + noise_1pm
+                margin = margin_m * inverse[j] * inverse[j] + noise_1pm
                 nearer[i, j], same[i, j] = ahead > margin, abs(ahead) <= margin
     return nearer, same
 

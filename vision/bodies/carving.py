@@ -171,7 +171,7 @@ def _of_one_body(grid: DepthGrid, own: BoolGrid, moving: BoolGrid, noise: DepthN
     x_m, _, z_m = grid.points(cells)
     of_moving = moving.ravel().take(cells)
     middle_x_m, middle_z_m = median(x_m[of_moving]), median(z_m[of_moving])
-    sigma_m = depth_sigma_of(middle_z_m, noise.floor_m, noise.quadratic_per_m)
+    sigma_m = depth_sigma_m(middle_z_m, noise)
     close = np.abs(x_m - middle_x_m) <= 0.5 * SINGLE_WIDTH_M
     close &= np.abs(z_m - middle_z_m) <= 0.5 * SINGLE_WIDTH_M + 2.0 * sigma_m
     result = np.zeros(own.shape, np.bool_)

@@ -77,6 +77,34 @@ def test_surface_that_was_hidden_or_not_measured_has_not_stayed() -> None:
         assert not stayed[inner(BODY)].any()
 
 
+def surely_stayed(before_m: FloatArray, now_m: FloatArray, age_ms: int = 1000) -> tuple[BoolGrid, float]:
+    grid = grid_of(now_m)
+    return memory((0, before_m)).stayed(grid, grid.valid, AT_ORIGIN, age_ms * MS, 1.0)
+
+
+@pytest.mark.parametrize(("age_ms", "known"), [(480, False), (520, True), (1480, True), (1520, False)])
+def test_surface_is_compared_with_a_view_of_about_the_wanted_time(age_ms: int, known: bool) -> None:
+    stayed, stayed_s = surely_stayed(BACK, nearest(BODY, BACK), age_ms)
+    assert stayed_s == (pytest.approx(age_ms * 1e-3) if known else 0.0)
+    assert stayed.any() == known
+    assert not stayed[inner(BODY)].any()
+
+
+@pytest.mark.parametrize(("nearer_m", "same"), [(0.13, True), (0.15, False)])
+def test_surface_surely_stayed_within_half_of_the_margin(nearer_m: float, same: bool) -> None:
+    """3 m away: 0.05 m and 1.75 sigmas of 9 * 0.0075 * 0.55 * sqrt(2) m are 0.142 m."""
+    stayed, _ = surely_stayed(wall(3.0 + nearer_m), nearest(BODY, wall(3.0 + nearer_m)))
+    assert bool(stayed[inner(BODY)].all()) == same
+
+
+def test_lone_cells_have_not_surely_stayed() -> None:
+    now_m = wall(5.0)
+    now_m[20, 30], now_m[40:43, 30:33] = 6.0, 6.0
+    stayed, _ = surely_stayed(BACK, now_m)
+    assert not stayed[20, 30]
+    assert stayed[41, 31]
+
+
 def test_surface_uncovered_by_a_leaving_body_has_not_arrived() -> None:
     assert not arrived(memory((0, nearest(BODY, BACK))), BACK).any()
 

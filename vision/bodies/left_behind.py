@@ -1,0 +1,157 @@
+"""What a mover leaves behind: furniture that connected depth has made part of its track.
+
+Somebody who walks past a table at arm's length is one part with it. As he goes on, the table stays where it
+was. A surface of a mover is not its own if it was there a second ago while the mover, by its velocity, was
+elsewhere. Such surfaces become static tracks, which claim them in the frames that follow
+(vision/bodies/votes.py).
+
+vision/tracker.py calls it after carving (vision/bodies/carving.py). Terms: vision/__init__.py.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from config.perception import DepthNoise, PerceptionConfig
+from hal.compiled import compiled, inlined
+from hal.types import FloatArray, Pose
+from vision.bodies.arrivals import ViewMemory
+from vision.bodies.births import MIN_CELLS
+from vision.bodies.division import SINGLE_WIDTH_M
+from vision.bodies.tracks import Tracks
+from vision.depth import regions
+from vision.depth.connected import IntGrid
+from vision.depth.depth_grid import BoolGrid, DepthGrid
+from vision.depth.depth_noise import depth_sigma_m
+from vision.depth.regions import Regions
+from vision.detection import Detection
+from vision.numerics.pose_axes import inner_vector
+from vision.numerics.relative_pose import NEAREST_M
+
+# The foot that a walker stands on stays for up to 0.7 s, and is his own.
+_LOOK_BACK_S = 1.0
+_MIN_DISPLACEMENT_M = 0.4  # half the width of a body: after less it still covers most of its former place
+_SAME_DEPTH_M = 0.3  # by so much the depth of one body differs from place to place
+_MAX_STEPS = 10  # of 0.4 m: no body is longer
+_SPEED_SHARES = (0.8, 1.0, 1.1)  # the true speed, as a share of the filtered one
+# A smaller share of a track is scraps that noise makes. If more than the larger share has stayed, the mover
+# itself cannot be told from the wall behind it.
+_LEAST_SHARE, _MOST_SHARE = 0.1, 0.7
+_SIGMA_M = 0.2  # of the position of a new track
+
+
+def part(
+    tracks: Tracks,
+    detection: Detection,
+    mask: BoolGrid,
+    labels: IntGrid,
+    measured: Regions,
+    memory: ViewMemory,
+    config: PerceptionConfig,
+) -> IntGrid:
+    """labels (h, w), track index + 1, in which what movers have left behind are static tracks of their own.
+
+    These are started in tracks. mask (h, w): cells above the floor. measured: regions of the first tracks, at
+    least of all that move. The same labels object is returned where nothing is left behind.
+    """
+    asked = _wide_movers(tracks, measured, config.depth_noise)
+    if not asked.any():
+        return labels
+    grid, pose, now_ns = detection.grid, detection.pose, detection.captured_ns
+    stayed, stayed_s = memory.stayed(grid, mask, pose, now_ns, _LOOK_BACK_S)
+    gone = asked & (tracks.speed_mps * stayed_s >= _MIN_DISPLACEMENT_M)
+    if not gone.any():
+        return labels
+    left = _left_behind(grid, labels, stayed, tracks.state[:, 3:] * stayed_s, gone, tracks.moving, pose)
+    cells = np.bincount(left.ravel(), minlength=len(gone) + 1)[1:]
+    of_track = np.bincount(labels.ravel(), minlength=len(gone) + 1)[1:]
+    parted = (cells >= np.maximum(MIN_CELLS, _LEAST_SHARE * of_track)) & (cells <= _MOST_SHARE * of_track)
+    for track in parted.nonzero()[0].tolist():
+        rest = left == track + 1
+        one = regions.measure(grid, rest.astype(np.int32), 1)
+        tracks.start(pose.apply(one.position_m), _SIGMA_M, config.motion.max_speed_mps, 0.0, now_ns)
+        labels = np.where(rest, np.int32(len(tracks)), labels)
+        kept = regions.measure(grid, (labels == track + 1).astype(np.int32), 1)
+        # Its centre jumps without having moved.
+        tracks.reset_position(np.array([track]), pose.apply(kept.position_m), _SIGMA_M**2 * np.eye(3)[None])
+        tracks.trailing_m[track] = tracks.state[track, :3]
+    return labels
+
+
+def _wide_movers(tracks: Tracks, measured: Regions, noise: DepthNoise) -> NDArray[np.bool_]:
+    """(T,) tracks that go fast enough to leave something behind, and are wider or deeper than one person."""
+    extent_m, sigma_m = measured.extent_m, depth_sigma_m(measured.position_m[:, 2], noise)
+    wide = (extent_m[:, 0] > SINGLE_WIDTH_M) | (extent_m[:, 2] > SINGLE_WIDTH_M + 2.0 * sigma_m)
+    result = tracks.moving & (tracks.speed_mps * _LOOK_BACK_S >= _MIN_DISPLACEMENT_M)
+    result[len(wide) :] = False
+    result[: len(wide)] &= wide
+    return result
+
+
+@inlined
+def _was_there(
+    grid: DepthGrid, on_mover: BoolGrid, stayed: BoolGrid, i: int, j: int, step_m: tuple[float, float, float]
+) -> bool:
+    """Whether the mover at cell i, j has covered this place before it moved by step_m, in the camera's axes.
+
+    If it has, the part of it that was here is a step further now. What is there may have stayed as well: a
+    long vehicle covers a place for several steps. The last step has to end at a surface that moves and has
+    not stayed; it may be another track, such as the trolley that a walker pushes. Out of view nothing is
+    known, so the mover may have been here.
+    """
+    height, width = stayed.shape
+    left, top = grid.x[0], grid.y[0]
+    per_column, per_row = 1.0 / (grid.x[1] - left), 1.0 / (grid.y[1] - top)
+    row, column = i, j
+    for _ in range(_MAX_STEPS):
+        depth_m = grid.depth_m[row, column]
+        x, y = grid.x[column] * depth_m + step_m[0], grid.y[row] * depth_m + step_m[1]
+        z = depth_m + step_m[2]
+        if z <= NEAREST_M:
+            return True
+        u, v = (x / z - left) * per_column + 0.5, (y / z - top) * per_row + 0.5
+        if not (0.0 <= u < width and 0.0 <= v < height):
+            return True
+        row, column = int(v), int(u)
+        if not on_mover[row, column] or abs(grid.depth_m[row, column] - z) > _SAME_DEPTH_M:
+            return False
+        if not stayed[row, column]:
+            return True
+    return True
+
+
+@compiled(DepthGrid, "int32[:, ::1], boolean[:, ::1], float64[:, :], boolean[::1], boolean[::1]", Pose)
+def _left_behind(
+    grid: DepthGrid,
+    labels: IntGrid,
+    stayed: BoolGrid,
+    displacement_m: FloatArray,
+    gone: NDArray[np.bool_],
+    moving: NDArray[np.bool_],
+    pose: Pose,
+) -> IntGrid:
+    """(h, w) track index + 1 of the cells in stayed (h, w) at whose place their track was not then.
+
+    displacement_m (T, 3): of the tracks since then. gone (T,): tracks that are looked at. moving (T,).
+    """
+    height, width = labels.shape
+    on_mover = np.zeros((height, width), np.bool_)
+    for i in range(height):
+        for j in range(width):
+            on_mover[i, j] = labels[i, j] > 0 and moving[labels[i, j] - 1]
+    result, moved_m = np.zeros((height, width), np.int32), np.zeros(displacement_m.shape)
+    for t in range(len(gone)):
+        moved_m[t] = inner_vector(pose, displacement_m[t])
+    for i in range(height):
+        for j in range(width):
+            t = labels[i, j] - 1
+            if t < 0 or not gone[t] or not stayed[i, j]:
+                continue
+            was_there = False
+            for share in _SPEED_SHARES:
+                step_m = share * moved_m[t, 0], share * moved_m[t, 1], share * moved_m[t, 2]
+                was_there = was_there or _was_there(grid, on_mover, stayed, i, j, step_m)
+            if not was_there:
+                result[i, j] = t + 1
+    return result
