@@ -54,6 +54,7 @@ def one(velocity: Speed = STILL, **changes: Any) -> MotionEvidence:
         size_m=np.array([0.8]),
         velocity_measured_s=np.array([0.0]),
         rim_mps=np.array([0.0]),
+        rim_sigmas=np.array([0.0]),
         rim_s=np.array([0.0]),
         view_radps=np.array([0.0]),
         growth_mps=np.array([0.0]),

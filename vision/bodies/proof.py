@@ -26,6 +26,7 @@ from vision.bodies.proof_rules import (
     arrival_of,
     by_arrival,
     by_fragments,
+    by_one_fragment,
     by_rim,
     by_surface,
     by_unrest,
@@ -54,7 +55,7 @@ _FILTERED, _FRAME, _SURFACE, _APART = range(4)
 class Proof:
     """Of T tracks, (T,) each.
 
-    moves, strength: motion is proven, and how many times the threshold is exceeded.
+    moves, strength: motion is proven, and how many times the threshold is exceeded; below 1 by one fragment.
     surely_static: this frame's fragments are sure that it stands still.
     over: a motion has ended, by surely_static or by another sign.
     goes_on: nothing new proves motion, but nothing speaks against it.
@@ -120,7 +121,7 @@ def _proofs(
         turning_mps = _WANDER * seen.view_radps[t] * size_m
         wander_mps = turning_mps + seen.growth_mps[t]
         surface = Surface(cells, size_m, seen.velocity_measured_s[t], wander_mps, seen.depth_sigma_m[t])
-        rim = Rim(abs(seen.rim_mps[t]), seen.rim_s[t], turning_mps)
+        rim = Rim(abs(seen.rim_mps[t]), seen.rim_sigmas[t], seen.rim_s[t], turning_mps)
         arrival = arrival_of(seen.arrived[t], seen.arriving_s[t], cells, dt_s)
         possible = filtered.speed_mps <= fastest_mps and size_m <= _LARGEST_M
         fast = filtered.speed_mps > least_mps[t]
@@ -129,15 +130,18 @@ def _proofs(
             or by_unrest(filtered, track_ends, threshold)
             or by_arrival(filtered, arrival.some, threshold)
             or by_surface(centre, surface, least_mps[t], dt_s, threshold)
-            or (by_rim(rim, size_m, least_mps[t], dt_s) and rim.speed_mps <= fastest_mps)
+            or (by_rim(rim, filtered, size_m, least_mps[t], dt_s, threshold) and rim.speed_mps <= fastest_mps)
         )
+        weakly = by_one_fragment(filtered, frame, opinion, track_ends, threshold)
         # The place where a mover has stopped was free a moment ago, so its arrival there is no proof.
         stands = not fast and filtered.sigma_mps < _KNOWN_SPEED * least_mps[t]
         stopped = moving[t] and stands
         came = (arrival.much and not stopped) or (arrival.lasting and not stands)
-        moves[t] = seen.trusted and possible and ((evident and fast) or came)
+        moves[t] = seen.trusted and possible and (((evident or weakly) and fast) or came)
         shown = np.minimum(np.maximum(filtered.along, filtered.across), np.maximum(frame.along, frame.across))
         strength[t] = np.minimum(shown / threshold, agreeing / ENDS_ACROSS)
+        if evident or came:
+            strength[t] = np.maximum(strength[t], 1.0)
         surely_static[t] = stands_surely(frame, agreeing, least_mps[t])
         # Neither depth nor a fragment tells it from the static surface beside it, along which it would drift.
         lost = moving[t] and seen.border_is_guess[t] and ends == 0 and not arrival.some

@@ -9,10 +9,12 @@ from typing import NamedTuple
 
 from hal.compiled import inlined
 from vision.bodies.arrivals import ARRIVED_CELLS, ARRIVED_SHARE, MUCH_ARRIVED_CELLS, MUCH_ARRIVED_SHARE
+from vision.motion.line_of_sight import CONFIRMING_SIGMAS
 
 _HOLDING_SQUARED_SIGMAS = 4.0  # two sigmas: with more, a mover still seems to move
 ENDS_ACROSS = 4  # two fragments: across the line of sight the position of each end is a measurement
 _ENDS_ALONG = 8  # four fragments: along it only the distance between two ends is, and ends slide
+_ENDS_OF_ONE, _MOST = 2, 0.5  # one fragment: both of its ends, and at least half of all ends of the track
 _LEVEL_SHARE = 0.5  # of the threshold: with less level motion across, as many ends are needed as along
 _UNREST_SHARE = 0.5  # of the threshold, for the filtered velocity of a restless body
 _LASTING_UNREST_S = 0.4  # longer than a limb swings one way
@@ -74,9 +76,14 @@ class Surface(NamedTuple):
 
 
 class Rim(NamedTuple):
-    """Motion of one track's free rims. wander_mps: how fast they may move while the body is static."""
+    """Motion of one track's free rims.
+
+    sigmas: standard deviations of its speed from zero, in this frame. shown_s: for how long it has been
+    clear. wander_mps: how fast they may move while the body is static.
+    """
 
     speed_mps: float
+    sigmas: float
     shown_s: float
     wander_mps: float
 
@@ -143,6 +150,20 @@ def _shared_with_surface(
 
 
 @inlined
+def by_one_fragment(
+    filtered: Velocity, frame: Velocity, second: Opinion, ends: Ends, threshold: float
+) -> bool:
+    """Whether a single fragment shows level motion across the line of sight.
+
+    Most ends of the track agree with it, and the surface does not deny it. It is the weakest proof: both ends
+    may slide along one outline.
+    """
+    most = ends.agreeing >= _ENDS_OF_ONE and ends.agreeing >= _MOST * ends.all
+    level = filtered.level > _LEVEL_SHARE * threshold
+    return most and level and shown_across(filtered, frame, threshold) and not second.denies_across
+
+
+@inlined
 def shown_across(filtered: Velocity, frame: Velocity, threshold: float) -> bool:
     """Whether filter and fragments show motion across the line of sight, by however few fragments."""
     return filtered.across > threshold and frame.across > 0.5 * threshold
@@ -182,14 +203,19 @@ def by_surface(centre: Velocity, seen: Surface, least_mps: float, dt_s: float, t
 
 
 @inlined
-def by_rim(rim: Rim, size_m: float, least_mps: float, dt_s: float) -> bool:
-    """Whether the free rims of a compact body go one way for too long to be chance.
+def by_rim(
+    rim: Rim, filtered: Velocity, size_m: float, least_mps: float, dt_s: float, threshold: float
+) -> bool:
+    """Whether the free rims of a compact body go one way for too long to be chance, or confirm the filter.
 
-    Of what is static, rims jump where other cells join it, but they do not go on. Up to wander_mps proves
-    nothing: as the viewpoint changes, another side of a static thing becomes its outline.
+    Of what is static, rims jump where other cells join it, but they do not go on. Those of one frame do not
+    take the filter beyond _LEVEL_SHARE by themselves: there, fragments or the centre show motion, too. Up to
+    wander_mps proves nothing: as the viewpoint changes, another side of a static thing becomes its outline.
     """
     lasting = rim.shown_s >= max(_LASTING_RIM_S, _MEASURED_FRAMES * dt_s)
-    return lasting and size_m <= _COMPACT_M and rim.speed_mps > least_mps + rim.wander_mps
+    confirms = rim.sigmas > CONFIRMING_SIGMAS and filtered.level > _LEVEL_SHARE * threshold
+    compact = size_m <= _COMPACT_M
+    return (lasting or confirms) and compact and rim.speed_mps > least_mps + rim.wander_mps
 
 
 @inlined

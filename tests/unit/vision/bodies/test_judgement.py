@@ -15,6 +15,7 @@ from tests.support.judging import (
     LEVEL_UP,
     SETTINGS,
     STILL,
+    SURE,
     UPWARDS,
     Speed,
     by_fragments,
@@ -34,9 +35,9 @@ def test_frame_without_evidence_proves_nothing() -> None:
     assert not rises(one(ACROSS))  # a fast filter that nothing stands behind
 
 
-def test_four_agreeing_ends_prove_a_motion_across() -> None:
+def test_agreeing_ends_prove_a_motion_across() -> None:
     assert rises(by_fragments(ACROSS, 4))
-    assert not rises(by_fragments(ACROSS, 3))
+    assert not rises(by_fragments(ACROSS, 1))
 
 
 def test_ends_count_by_how_many_agree() -> None:
@@ -44,6 +45,21 @@ def test_ends_count_by_how_many_agree() -> None:
     assert not rises(by_fragments(ACROSS, 8, 0.45))  # 3.6 of them
     assert not rises(by_fragments(ACROSS, 40, 0.15))  # 6 of them, but of many that do not
     assert rises(by_fragments(ACROSS, 40, 0.3))
+
+
+def test_one_fragment_proves_a_motion_across_if_most_ends_agree_with_it() -> None:
+    assert rises(by_fragments(ACROSS, 2))
+    assert rises(by_fragments(ACROSS, 4, 0.5))
+    assert not rises(by_fragments(ACROSS, 5, 0.4))  # two of five
+    assert not rises(by_fragments(ALONG, 2))
+
+
+def test_one_fragment_proves_level_motion_only_that_nothing_contradicts() -> None:
+    assert rises(by_fragments((0.32, -0.8, 0.0), ends=2))  # 9.4 squared sigmas are level
+    assert not rises(by_fragments((0.28, -0.8, 0.0), ends=2))  # 7.2
+    assert not rises(by_fragments(ACROSS, 2, **surface(STILL, 0.08)))
+    assert not rises(by_fragments(ACROSS, 2, own_velocity=np.array([[0.25, 0.0, 0.0]])))
+    assert not rises(by_fragments(ACROSS, 2, covariance=covariance(0.042)))
 
 
 def test_this_frames_fragments_must_bear_out_the_filter() -> None:
@@ -144,8 +160,9 @@ def test_a_displacement_far_beyond_depth_noise_proves_motion_as_soon_along_as_ac
 
 
 def by_rim(rim_mps: float = 0.8, rim_s: float = 0.15, **changes: Any) -> MotionEvidence:
-    """A half hidden body: nothing but its free rims tells that it goes."""
-    return one(ACROSS, **{"rim_mps": np.array([rim_mps]), "rim_s": np.array([rim_s]), **changes})
+    """A half hidden body: only its free rims tell that it goes; of the filter 0.64 / 0.0909 = 7.0."""
+    rims = {"rim_mps": np.array([rim_mps]), "rim_s": np.array([rim_s]), "rim_sigmas": np.array([5.0])}
+    return one(ACROSS, **{**rims, "covariance": covariance(0.09), **changes})
 
 
 def test_free_rims_that_go_one_way_long_enough_prove_motion() -> None:
@@ -154,6 +171,17 @@ def test_free_rims_that_go_one_way_long_enough_prove_motion() -> None:
     assert not rises(by_rim(rim_s=0.1))
     assert not rises(by_rim(0.2))  # slower than 0.21 m/s
     assert not rises(by_rim(2.5))  # faster than anything
+
+
+def test_free_rims_of_one_frame_prove_a_motion_that_the_filter_shows_too() -> None:
+    knows = {"rim_s": 0.0, "covariance": covariance(0.078)}  # 0.64 / 0.0789 = 8.1, more than half of 16
+    assert rises(by_rim(**knows))
+    assert rises(by_rim(**knows, rim_sigmas=np.array([2.6])))
+    assert not rises(by_rim(**knows, rim_sigmas=np.array([2.4])))
+    assert not rises(by_rim(**{**knows, "covariance": covariance(0.08)}))  # 7.9
+    assert not rises(by_rim(0.2, **knows))  # slower than 0.21 m/s
+    assert not rises(by_rim(**knows, size_m=np.array([2.3])))
+    assert not rises(replace(by_rim(**knows), velocity=np.array([ALONG])))
 
 
 def test_free_rims_prove_nothing_for_what_is_large_or_that_a_new_viewpoint_explains() -> None:
@@ -240,7 +268,9 @@ EVIDENT = {
     "fragments across": by_fragments(ACROSS, 20),
     "fragments along": by_fragments(ALONG, 20),
     "surface": by_surface(ACROSS, 1.0),
+    "one fragment": by_fragments(ACROSS, 2),
     "free rims": by_rim(),
+    "free rims and filter": by_rim(rim_s=0.0, covariance=covariance(SURE)),
     "arrival": one(ACROSS, arrived=np.array([10])),
     "much has come": one(STILL, arrived=np.array([60])),
     "lasting arrival": one(
