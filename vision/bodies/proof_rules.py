@@ -14,7 +14,8 @@ from vision.motion.line_of_sight import CONFIRMING_SIGMAS
 _HOLDING_SQUARED_SIGMAS = 4.0  # two sigmas: with more, a mover still seems to move
 ENDS_ACROSS = 4  # two fragments: across the line of sight the position of each end is a measurement
 _ENDS_ALONG = 8  # four fragments: along it only the distance between two ends is, and ends slide
-_ENDS_OF_ONE, _MOST = 2, 0.5  # one fragment: both of its ends, and at least half of all ends of the track
+_ENDS_OF_ONE = 2  # one fragment: both of its ends
+_MOST = 0.5  # share of the ends of a track that must agree with its one fragment
 _LEVEL_SHARE = 0.5  # of the threshold: with less level motion across, as many ends are needed as along
 _UNREST_SHARE = 0.5  # of the threshold, for the filtered velocity of a restless body
 _LASTING_UNREST_S = 0.4  # longer than a limb swings one way
@@ -203,19 +204,34 @@ def by_surface(centre: Velocity, seen: Surface, least_mps: float, dt_s: float, t
 
 
 @inlined
-def by_rim(
-    rim: Rim, filtered: Velocity, size_m: float, least_mps: float, dt_s: float, threshold: float
-) -> bool:
-    """Whether the free rims of a compact body go one way for too long to be chance, or confirm the filter.
+def by_rim(rim: Rim, size_m: float, least_mps: float, dt_s: float) -> bool:
+    """Whether the free rims of a compact body go one way for too long to be chance.
 
-    Of what is static, rims jump where other cells join it, but they do not go on. Those of one frame do not
-    take the filter beyond _LEVEL_SHARE by themselves: there, fragments or the centre show motion, too. Up to
-    wander_mps proves nothing: as the viewpoint changes, another side of a static thing becomes its outline.
+    Of what is static, rims jump where other cells join it, but they do not go on. Up to wander_mps proves
+    nothing: as the viewpoint changes, another side of a static thing becomes its outline.
     """
     lasting = rim.shown_s >= max(_LASTING_RIM_S, _MEASURED_FRAMES * dt_s)
-    confirms = rim.sigmas > CONFIRMING_SIGMAS and filtered.level > _LEVEL_SHARE * threshold
-    compact = size_m <= _COMPACT_M
-    return (lasting or confirms) and compact and rim.speed_mps > least_mps + rim.wander_mps
+    return lasting and size_m <= _COMPACT_M and rim.speed_mps > least_mps + rim.wander_mps
+
+
+@inlined
+def by_confirming_rim(
+    rim: Rim,
+    filtered: Velocity,
+    frame: Velocity,
+    ends: Ends,
+    seen: Surface,
+    least_mps: float,
+    threshold: float,
+) -> bool:
+    """Whether the free rims of one frame confirm a level motion of a compact body.
+
+    They are part of the filter, so fragments of this frame or the centre of a whole surface have to show the
+    motion, too. Where a walker uncovers a wall, a rim of the wall may seem free, and goes as he does.
+    """
+    clear = rim.sigmas > CONFIRMING_SIGMAS and filtered.level > _LEVEL_SHARE * threshold
+    shown = seen.velocity_measured_s > 0.0 or (ends.agreeing >= _ENDS_OF_ONE and frame.across > _FRAME_PROOF)
+    return clear and shown and seen.size_m <= _COMPACT_M and rim.speed_mps > least_mps + rim.wander_mps
 
 
 @inlined
