@@ -16,9 +16,8 @@ squared; ends: end points of the track's fragments):
   for what has just stopped.
 * Surface (by_surface): the centre of a whole, compact surface moves for longer and more clearly than a
   change of viewpoint or a growing surface explains.
-* Free rims (by_rim): the outline of a compact body, where nothing nearer hides it, goes one way for 0.12 s.
-* Rims that confirm (by_confirming_rim): by 2.5 sigmas, a filtered velocity whose level motion exceeds half of
-  the threshold, and which fragments or the centre of a whole surface show, too.
+* Free rims (by_rim): the outline of a compact body, where nothing nearer hides it, goes one way for 0.12 s,
+  or confirms by 2.5 sigmas a filtered velocity whose level motion exceeds half of the threshold.
 * One fragment (by_one_fragment): level motion across the line of sight, by filter and frame as for four ends,
   shown by 2 ends that are at least half of all. It is the weakest proof and raises the score half as fast.
 

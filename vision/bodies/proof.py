@@ -25,7 +25,6 @@ from vision.bodies.proof_rules import (
     Velocity,
     arrival_of,
     by_arrival,
-    by_confirming_rim,
     by_fragments,
     by_one_fragment,
     by_rim,
@@ -131,8 +130,7 @@ def _proofs(
             or by_unrest(filtered, track_ends, threshold)
             or by_arrival(filtered, arrival.some, threshold)
             or by_surface(centre, surface, least_mps[t], dt_s, threshold)
-            or (rim.speed_mps <= fastest_mps and by_rim(rim, size_m, least_mps[t], dt_s))
-            or by_confirming_rim(rim, filtered, frame, track_ends, surface, least_mps[t], threshold)
+            or (by_rim(rim, filtered, size_m, least_mps[t], dt_s, threshold) and rim.speed_mps <= fastest_mps)
         )
         weakly = by_one_fragment(filtered, frame, opinion, track_ends, threshold)
         # The place where a mover has stopped was free a moment ago, so its arrival there is no proof.

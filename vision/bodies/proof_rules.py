@@ -204,34 +204,19 @@ def by_surface(centre: Velocity, seen: Surface, least_mps: float, dt_s: float, t
 
 
 @inlined
-def by_rim(rim: Rim, size_m: float, least_mps: float, dt_s: float) -> bool:
-    """Whether the free rims of a compact body go one way for too long to be chance.
+def by_rim(
+    rim: Rim, filtered: Velocity, size_m: float, least_mps: float, dt_s: float, threshold: float
+) -> bool:
+    """Whether the free rims of a compact body go one way for too long to be chance, or confirm the filter.
 
-    Of what is static, rims jump where other cells join it, but they do not go on. Up to wander_mps proves
-    nothing: as the viewpoint changes, another side of a static thing becomes its outline.
+    Of what is static, rims jump where other cells join it, but they do not go on. The filter takes up only a
+    part of the rims of one frame, so these are very clear, or something else shows the motion, too. Up to
+    wander_mps proves nothing: as the viewpoint changes, another side of a static thing becomes its outline.
     """
     lasting = rim.shown_s >= max(_LASTING_RIM_S, _MEASURED_FRAMES * dt_s)
-    return lasting and size_m <= _COMPACT_M and rim.speed_mps > least_mps + rim.wander_mps
-
-
-@inlined
-def by_confirming_rim(
-    rim: Rim,
-    filtered: Velocity,
-    frame: Velocity,
-    ends: Ends,
-    seen: Surface,
-    least_mps: float,
-    threshold: float,
-) -> bool:
-    """Whether the free rims of one frame confirm a level motion of a compact body.
-
-    They are part of the filter, so fragments of this frame or the centre of a whole surface have to show the
-    motion, too. Where a walker uncovers a wall, a rim of the wall may seem free, and goes as he does.
-    """
-    clear = rim.sigmas > CONFIRMING_SIGMAS and filtered.level > _LEVEL_SHARE * threshold
-    shown = seen.velocity_measured_s > 0.0 or (ends.agreeing >= _ENDS_OF_ONE and frame.across > _FRAME_PROOF)
-    return clear and shown and seen.size_m <= _COMPACT_M and rim.speed_mps > least_mps + rim.wander_mps
+    confirms = rim.sigmas > CONFIRMING_SIGMAS and filtered.level > _LEVEL_SHARE * threshold
+    compact = size_m <= _COMPACT_M
+    return (lasting or confirms) and compact and rim.speed_mps > least_mps + rim.wander_mps
 
 
 @inlined

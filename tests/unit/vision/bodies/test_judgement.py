@@ -15,6 +15,7 @@ from tests.support.judging import (
     LEVEL_UP,
     SETTINGS,
     STILL,
+    SURE,
     UPWARDS,
     Speed,
     by_fragments,
@@ -172,30 +173,15 @@ def test_free_rims_that_go_one_way_long_enough_prove_motion() -> None:
     assert not rises(by_rim(2.5))  # faster than anything
 
 
-def confirming(rim_mps: float = 0.8, **changes: Any) -> MotionEvidence:
-    """The rims of one frame; the centre, and the filter with 0.64 / 0.0789 = 8.1, more than half of 16."""
-    knows = {"covariance": covariance(0.078), "velocity_measured_s": np.array([0.05])}
-    return by_rim(rim_mps, 0.0, **{**knows, **changes})
-
-
-def test_free_rims_of_one_frame_confirm_a_motion_that_the_filter_shows() -> None:
-    assert rises(confirming())
-    assert rises(confirming(rim_sigmas=np.array([2.6])))
-    assert not rises(confirming(rim_sigmas=np.array([2.4])))
-    assert not rises(confirming(covariance=covariance(0.08)))  # 7.9
-    assert not rises(replace(confirming(), velocity=np.array([ALONG])))
-    assert not rises(confirming(0.2))  # slower than 0.21 m/s
-    assert not rises(confirming(view_radps=np.array([1.6])))  # 0.21 + 0.5 * 0.8 m * 1.6 rad/s = 0.85 m/s
-    assert not rises(confirming(size_m=np.array([2.3])))
-
-
-def test_rims_confirm_nothing_that_neither_fragments_nor_the_centre_of_a_whole_surface_show() -> None:
-    none = {"velocity_measured_s": np.array([0.0])}
-    assert not rises(confirming(**none))
-    shows = {**none, "ends": np.array([2]), "agreement": np.array([1.0]), "own_velocity": np.array([ACROSS])}
-    assert rises(confirming(**shows, own_covariance=covariance(0.2)))  # 0.64 / 0.2009 = 3.2
-    assert not rises(confirming(**shows, own_covariance=covariance(0.22)))  # 2.9
-    assert not rises(confirming(**{**shows, "ends": np.array([1])}, own_covariance=covariance(0.2)))
+def test_free_rims_of_one_frame_prove_a_motion_that_the_filter_shows_too() -> None:
+    knows = {"rim_s": 0.0, "covariance": covariance(0.078)}  # 0.64 / 0.0789 = 8.1, more than half of 16
+    assert rises(by_rim(**knows))
+    assert rises(by_rim(**knows, rim_sigmas=np.array([2.6])))
+    assert not rises(by_rim(**knows, rim_sigmas=np.array([2.4])))
+    assert not rises(by_rim(**{**knows, "covariance": covariance(0.08)}))  # 7.9
+    assert not rises(by_rim(0.2, **knows))  # slower than 0.21 m/s
+    assert not rises(by_rim(**knows, size_m=np.array([2.3])))
+    assert not rises(replace(by_rim(**knows), velocity=np.array([ALONG])))
 
 
 def test_free_rims_prove_nothing_for_what_is_large_or_that_a_new_viewpoint_explains() -> None:
@@ -284,7 +270,7 @@ EVIDENT = {
     "surface": by_surface(ACROSS, 1.0),
     "one fragment": by_fragments(ACROSS, 2),
     "free rims": by_rim(),
-    "free rims that confirm": confirming(),
+    "free rims and filter": by_rim(rim_s=0.0, covariance=covariance(SURE)),
     "arrival": one(ACROSS, arrived=np.array([10])),
     "much has come": one(STILL, arrived=np.array([60])),
     "lasting arrival": one(
