@@ -174,7 +174,8 @@ def test_free_rims_that_go_one_way_long_enough_prove_motion() -> None:
 
 
 def test_free_rims_of_one_frame_prove_a_motion_that_the_filter_shows_too() -> None:
-    knows = {"rim_s": 0.0, "covariance": covariance(0.078)}  # 0.64 / 0.0789 = 8.1, more than half of 16
+    # 0.64 / 0.0789 = 8.1, more than half of 16.
+    knows: dict[str, Any] = {"rim_s": 0.0, "covariance": covariance(0.078)}
     assert rises(by_rim(**knows))
     assert rises(by_rim(**knows, rim_sigmas=np.array([2.6])))
     assert not rises(by_rim(**knows, rim_sigmas=np.array([2.4])))
