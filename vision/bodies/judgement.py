@@ -18,8 +18,6 @@ squared; ends: end points of the track's fragments):
   change of viewpoint or a growing surface explains.
 * Free rims (by_rim): the outline of a compact body, where nothing nearer hides it, goes one way for 0.12 s,
   or confirms by 2.5 sigmas a filtered velocity whose level motion exceeds half of the threshold.
-* One fragment (by_one_fragment): level motion across the line of sight, by filter and frame as for four ends,
-  shown by 2 ends that are at least half of all. It is the weakest proof and raises the score half as fast.
 
 All kinds need a known motion of the camera and, except for much arrival, more than the minimum speed. Bodies
 that are implausibly fast or wide prove nothing.
@@ -132,8 +130,8 @@ def _updated_scores(
     )
     for t in range(len(moving)):
         if proof.moves[t] and not proof.surely_static[t]:
-            # A stronger proof raises the score faster, one fragment alone more slowly.
-            pace = np.minimum(proof.strength[t], _FASTEST)
+            # A stronger proof raises the score faster.
+            pace = np.minimum(np.maximum(proof.strength[t], 1.0), _FASTEST)
             change = borne_out * np.minimum(pace * rise, _MAX_RISE)
         else:
             change = -dt_s / (_STOP_S if proof.over[t] else _HOLD_S if proof.goes_on[t] else _FALL_S)

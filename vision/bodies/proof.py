@@ -26,7 +26,6 @@ from vision.bodies.proof_rules import (
     arrival_of,
     by_arrival,
     by_fragments,
-    by_one_fragment,
     by_rim,
     by_surface,
     by_unrest,
@@ -55,7 +54,7 @@ _FILTERED, _FRAME, _SURFACE, _APART = range(4)
 class Proof:
     """Of T tracks, (T,) each.
 
-    moves, strength: motion is proven, and how many times the threshold is exceeded; below 1 by one fragment.
+    moves, strength: motion is proven, and how many times the threshold is exceeded.
     surely_static: this frame's fragments are sure that it stands still.
     over: a motion has ended, by surely_static or by another sign.
     goes_on: nothing new proves motion, but nothing speaks against it.
@@ -132,16 +131,13 @@ def _proofs(
             or by_surface(centre, surface, least_mps[t], dt_s, threshold)
             or (by_rim(rim, filtered, size_m, least_mps[t], dt_s, threshold) and rim.speed_mps <= fastest_mps)
         )
-        weakly = by_one_fragment(filtered, frame, opinion, track_ends, threshold)
         # The place where a mover has stopped was free a moment ago, so its arrival there is no proof.
         stands = not fast and filtered.sigma_mps < _KNOWN_SPEED * least_mps[t]
         stopped = moving[t] and stands
         came = (arrival.much and not stopped) or (arrival.lasting and not stands)
-        moves[t] = seen.trusted and possible and (((evident or weakly) and fast) or came)
+        moves[t] = seen.trusted and possible and ((evident and fast) or came)
         shown = np.minimum(np.maximum(filtered.along, filtered.across), np.maximum(frame.along, frame.across))
         strength[t] = np.minimum(shown / threshold, agreeing / ENDS_ACROSS)
-        if evident or came:
-            strength[t] = np.maximum(strength[t], 1.0)
         surely_static[t] = stands_surely(frame, agreeing, least_mps[t])
         # Neither depth nor a fragment tells it from the static surface beside it, along which it would drift.
         lost = moving[t] and seen.border_is_guess[t] and ends == 0 and not arrival.some

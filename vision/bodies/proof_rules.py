@@ -14,8 +14,6 @@ from vision.motion.line_of_sight import CONFIRMING_SIGMAS
 _HOLDING_SQUARED_SIGMAS = 4.0  # two sigmas: with more, a mover still seems to move
 ENDS_ACROSS = 4  # two fragments: across the line of sight the position of each end is a measurement
 _ENDS_ALONG = 8  # four fragments: along it only the distance between two ends is, and ends slide
-_ENDS_OF_ONE = 2  # one fragment: both of its ends
-_MOST = 0.5  # share of the ends of a track that must agree with its one fragment
 _LEVEL_SHARE = 0.5  # of the threshold: with less level motion across, as many ends are needed as along
 _UNREST_SHARE = 0.5  # of the threshold, for the filtered velocity of a restless body
 _LASTING_UNREST_S = 0.4  # longer than a limb swings one way
@@ -148,20 +146,6 @@ def _shared_with_surface(
     along = filtered.along > less and second.confirms_along and frame.along > _FRAME_PROOF
     across = filtered.across > less and second.confirms_across and frame.across > _FRAME_PROOF
     return (along or across) and (ends.agreeing >= 2 or ends.restless)
-
-
-@inlined
-def by_one_fragment(
-    filtered: Velocity, frame: Velocity, second: Opinion, ends: Ends, threshold: float
-) -> bool:
-    """Whether a single fragment shows level motion across the line of sight.
-
-    Most ends of the track agree with it, and the surface does not deny it. It is the weakest proof: both ends
-    may slide along one outline.
-    """
-    most = ends.agreeing >= _ENDS_OF_ONE and ends.agreeing >= _MOST * ends.all
-    level = filtered.level > _LEVEL_SHARE * threshold
-    return most and level and shown_across(filtered, frame, threshold) and not second.denies_across
 
 
 @inlined

@@ -35,9 +35,9 @@ def test_frame_without_evidence_proves_nothing() -> None:
     assert not rises(one(ACROSS))  # a fast filter that nothing stands behind
 
 
-def test_agreeing_ends_prove_a_motion_across() -> None:
+def test_four_agreeing_ends_prove_a_motion_across() -> None:
     assert rises(by_fragments(ACROSS, 4))
-    assert not rises(by_fragments(ACROSS, 1))
+    assert not rises(by_fragments(ACROSS, 3))
 
 
 def test_ends_count_by_how_many_agree() -> None:
@@ -45,21 +45,6 @@ def test_ends_count_by_how_many_agree() -> None:
     assert not rises(by_fragments(ACROSS, 8, 0.45))  # 3.6 of them
     assert not rises(by_fragments(ACROSS, 40, 0.15))  # 6 of them, but of many that do not
     assert rises(by_fragments(ACROSS, 40, 0.3))
-
-
-def test_one_fragment_proves_a_motion_across_if_most_ends_agree_with_it() -> None:
-    assert rises(by_fragments(ACROSS, 2))
-    assert rises(by_fragments(ACROSS, 4, 0.5))
-    assert not rises(by_fragments(ACROSS, 5, 0.4))  # two of five
-    assert not rises(by_fragments(ALONG, 2))
-
-
-def test_one_fragment_proves_level_motion_only_that_nothing_contradicts() -> None:
-    assert rises(by_fragments((0.32, -0.8, 0.0), ends=2))  # 9.4 squared sigmas are level
-    assert not rises(by_fragments((0.28, -0.8, 0.0), ends=2))  # 7.2
-    assert not rises(by_fragments(ACROSS, 2, **surface(STILL, 0.08)))
-    assert not rises(by_fragments(ACROSS, 2, own_velocity=np.array([[0.25, 0.0, 0.0]])))
-    assert not rises(by_fragments(ACROSS, 2, covariance=covariance(0.042)))
 
 
 def test_this_frames_fragments_must_bear_out_the_filter() -> None:
@@ -269,7 +254,6 @@ EVIDENT = {
     "fragments across": by_fragments(ACROSS, 20),
     "fragments along": by_fragments(ALONG, 20),
     "surface": by_surface(ACROSS, 1.0),
-    "one fragment": by_fragments(ACROSS, 2),
     "free rims": by_rim(),
     "free rims and filter": by_rim(rim_s=0.0, covariance=covariance(SURE)),
     "arrival": one(ACROSS, arrived=np.array([10])),

@@ -18,7 +18,6 @@ from tests.support.judging import (
     covariance,
     one,
     rises,
-    surface,
     verdict,
 )
 from vision.bodies.judgement import Verdict, judge
@@ -64,17 +63,9 @@ def test_proof_counts_by_how_well_the_cameras_own_motion_is_borne_out() -> None:
     assert verdict(replace(seen, borne_out=0.25)).evidence[0] == 0.125
 
 
-def test_one_fragment_alone_takes_twice_as_long() -> None:
-    assert rise_s(by_fragments(ACROSS, 2)) == pytest.approx(2.0 * PLAIN_S)
-    assert rise_s(by_fragments(ACROSS, 3)) == pytest.approx(PLAIN_S / 0.75)
-    # Not where something else proves it as well, as a surface that has arrived.
-    assert rise_s(by_fragments(ACROSS, 2, arrived=np.array([10]))) == pytest.approx(PLAIN_S)
-
-
 def test_evidence_falls_slowly_while_one_fragment_still_moves() -> None:
     half = 0.5
-    denied = by_fragments(ACROSS, 2, **surface(STILL, 0.08))
-    waiting = judge(denied, np.full(1, half), np.zeros(1, np.bool_), 0.03, SETTINGS)
+    waiting = judge(by_fragments(ACROSS, 2), np.full(1, half), np.zeros(1, np.bool_), 0.03, SETTINGS)
     assert half - 0.02 < waiting.evidence[0] < half  # two seconds for all of it
     nothing = judge(one(ACROSS), np.full(1, half), np.zeros(1, np.bool_), 0.03, SETTINGS)
     assert nothing.evidence[0] < half - 0.09
