@@ -247,9 +247,7 @@ class Tracker:
         tracks.arriving_s = _sustained(tracks.arriving_s, arriving(arrivals, cells), detection.dt_s)
         tracks.rim_s = rim_motion.one_way_s(tracks.rim_s, rims, settings.sigmas, detection.dt_s)
         advances = tracks.update_trailing_average(detection.dt_s)
-        seen = evidence_of(
-            tracks, detection, body, advances, arrivals, cells, rims.mps, self._config.depth_noise
-        )
+        seen = evidence_of(tracks, detection, body, advances, arrivals, cells, rims, self._config.depth_noise)
         verdict = judge(seen, tracks.evidence, tracks.moving, detection.dt_s, settings)
         tracks.evidence, tracks.moving = verdict.evidence, verdict.moving
         tracks.confidence, tracks.surely_static = verdict.confidence, verdict.surely_static

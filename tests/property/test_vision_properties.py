@@ -222,6 +222,7 @@ def any_evidence(seed: int, count: int, trusted: bool) -> MotionEvidence:
         size_m=rng.uniform(0.0, 4.0, count),
         velocity_measured_s=rng.uniform(0.0, 1.0, count),
         rim_mps=rng.normal(0.0, 1.0, count),
+        rim_sigmas=rng.uniform(0.0, 6.0, count),
         rim_s=rng.uniform(0.0, 0.3, count),
         view_radps=rng.uniform(0.0, 1.0, count),
         growth_mps=rng.uniform(0.0, 1.0, count),

@@ -54,6 +54,7 @@ def one(velocity: Speed = STILL, **changes: Any) -> MotionEvidence:
         size_m=np.array([0.8]),
         velocity_measured_s=np.array([0.0]),
         rim_mps=np.array([0.0]),
+        rim_sigmas=np.array([0.0]),
         rim_s=np.array([0.0]),
         view_radps=np.array([0.0]),
         growth_mps=np.array([0.0]),
@@ -94,5 +95,6 @@ def by_surface(velocity: Speed, velocity_measured_s: float, **changes: Any) -> M
 
 
 def by_rim(rim_mps: float = 0.8, rim_s: float = 0.15, **changes: Any) -> MotionEvidence:
-    """A half hidden body: nothing but its free rims tells that it goes."""
-    return one(ACROSS, **{"rim_mps": np.array([rim_mps]), "rim_s": np.array([rim_s]), **changes})
+    """A half hidden body: only its free rims tell that it goes; of the filter 0.64 / 0.0909 = 7.0."""
+    rims = {"rim_mps": np.array([rim_mps]), "rim_s": np.array([rim_s]), "rim_sigmas": np.array([5.0])}
+    return one(ACROSS, **{**rims, "covariance": covariance(0.09), **changes})

@@ -16,7 +16,8 @@ squared; ends: end points of the track's fragments):
   for what has just stopped.
 * Surface (by_surface): the centre of a whole, compact surface moves for longer and more clearly than a
   change of viewpoint or a growing surface explains.
-* Free rims (by_rim): the outline of a compact body, where nothing nearer hides it, goes one way for 0.12 s.
+* Free rims (by_rim): the outline of a compact body, where nothing nearer hides it, goes one way for 0.12 s,
+  or confirms by 2.5 sigmas a filtered velocity whose level motion exceeds half of the threshold.
 
 All kinds need a known motion of the camera and, except for much arrival, more than the minimum speed. Bodies
 that are implausibly fast or wide prove nothing.

@@ -120,7 +120,7 @@ def _proofs(
         turning_mps = _WANDER * seen.view_radps[t] * size_m
         wander_mps = turning_mps + seen.growth_mps[t]
         surface = Surface(cells, size_m, seen.velocity_measured_s[t], wander_mps, seen.depth_sigma_m[t])
-        rim = Rim(abs(seen.rim_mps[t]), seen.rim_s[t], turning_mps)
+        rim = Rim(abs(seen.rim_mps[t]), seen.rim_sigmas[t], seen.rim_s[t], turning_mps)
         arrival = arrival_of(seen.arrived[t], seen.arriving_s[t], cells, dt_s)
         possible = filtered.speed_mps <= fastest_mps and size_m <= _LARGEST_M
         fast = filtered.speed_mps > least_mps[t]
@@ -129,7 +129,7 @@ def _proofs(
             or by_unrest(filtered, track_ends, threshold)
             or by_arrival(filtered, arrival.some, threshold)
             or by_surface(centre, surface, least_mps[t], dt_s, threshold)
-            or (by_rim(rim, size_m, least_mps[t], dt_s) and rim.speed_mps <= fastest_mps)
+            or (by_rim(rim, filtered, size_m, least_mps[t], dt_s, threshold) and rim.speed_mps <= fastest_mps)
         )
         # The place where a mover has stopped was free a moment ago, so its arrival there is no proof.
         stands = not fast and filtered.sigma_mps < _KNOWN_SPEED * least_mps[t]

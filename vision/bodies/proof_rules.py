@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from hal.compiled import inlined
 from vision.bodies.arrivals import ARRIVED_CELLS, ARRIVED_SHARE, MUCH_ARRIVED_CELLS, MUCH_ARRIVED_SHARE
+from vision.motion.line_of_sight import CONFIRMING_SIGMAS
 
 _HOLDING_SQUARED_SIGMAS = 4.0  # two sigmas: with more, a mover still seems to move
 ENDS_ACROSS = 4  # two fragments: across the line of sight the position of each end is a measurement
@@ -74,9 +75,14 @@ class Surface(NamedTuple):
 
 
 class Rim(NamedTuple):
-    """Motion of one track's free rims. wander_mps: how fast they may move while the body is static."""
+    """Motion of one track's free rims.
+
+    sigmas: standard deviations of its speed from zero, in this frame. shown_s: for how long it has been
+    clear. wander_mps: how fast they may move while the body is static.
+    """
 
     speed_mps: float
+    sigmas: float
     shown_s: float
     wander_mps: float
 
@@ -182,14 +188,19 @@ def by_surface(centre: Velocity, seen: Surface, least_mps: float, dt_s: float, t
 
 
 @inlined
-def by_rim(rim: Rim, size_m: float, least_mps: float, dt_s: float) -> bool:
-    """Whether the free rims of a compact body go one way for too long to be chance.
+def by_rim(
+    rim: Rim, filtered: Velocity, size_m: float, least_mps: float, dt_s: float, threshold: float
+) -> bool:
+    """Whether the free rims of a compact body go one way for too long to be chance, or confirm the filter.
 
-    Of what is static, rims jump where other cells join it, but they do not go on. Up to wander_mps proves
-    nothing: as the viewpoint changes, another side of a static thing becomes its outline.
+    Of what is static, rims jump where other cells join it, but they do not go on. The filter takes up only a
+    part of the rims of one frame, so these are very clear, or something else shows the motion, too. Up to
+    wander_mps proves nothing: as the viewpoint changes, another side of a static thing becomes its outline.
     """
     lasting = rim.shown_s >= max(_LASTING_RIM_S, _MEASURED_FRAMES * dt_s)
-    return lasting and size_m <= _COMPACT_M and rim.speed_mps > least_mps + rim.wander_mps
+    confirms = rim.sigmas > CONFIRMING_SIGMAS and filtered.level > _LEVEL_SHARE * threshold
+    compact = size_m <= _COMPACT_M
+    return (lasting or confirms) and compact and rim.speed_mps > least_mps + rim.wander_mps
 
 
 @inlined

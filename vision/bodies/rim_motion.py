@@ -56,6 +56,12 @@ class RimVelocities:
     direction: Matrix
     lag_s: Vector
 
+    @property
+    def sigmas(self) -> FloatArray:
+        """(T,) how many standard deviations mps is from zero; 0 where nothing is measured."""
+        result: FloatArray = np.abs(self.mps) / np.hypot(self.sigma_mps, _FLOOR_SIGMA_MPS)
+        return result
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _View:
@@ -247,7 +253,7 @@ def one_way_s(so_far_s: FloatArray, rims: RimVelocities, sigmas: float, dt_s: fl
 
     Negative to the left. sigmas: so clear it has to be.
     """
-    clear = np.abs(rims.mps) > sigmas * np.hypot(rims.sigma_mps, _FLOOR_SIGMA_MPS)
+    clear = rims.sigmas > sigmas
     way = np.sign(rims.mps)
     before_s = np.where(np.sign(so_far_s) == way, so_far_s, 0.0)
     return np.where(clear, before_s + way * dt_s, 0.0)

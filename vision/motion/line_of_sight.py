@@ -17,7 +17,7 @@ from hal.types import Flags, FloatArray
 
 _FLOOR_SIGMA_MPS = 0.03  # added sigma: error of the camera's own motion, which no filter models
 _CONTRADICTION_SIGMAS = 2.5  # 99 % of equal velocities differ by less
-_CONFIRMING_SIGMAS = 2.5  # as clear as a contradiction has to be
+CONFIRMING_SIGMAS = 2.5  # as clear as a contradiction has to be
 _MIN_LEVEL = 1e-6  # lower bound of a length: in a vertical line of sight no direction is level
 _FLOOR = _FLOOR_SIGMA_MPS**2
 _AXES = 3
@@ -182,7 +182,7 @@ class SecondOpinion:
 
 def second_opinion(fragments: Split, surface: Split, apart: Split) -> SecondOpinion:
     """Compare velocities of T bodies by their fragments and by their surfaces; apart: the difference."""
-    denied, least = _CONTRADICTION_SIGMAS**2, _CONFIRMING_SIGMAS**2
+    denied, least = _CONTRADICTION_SIGMAS**2, CONFIRMING_SIGMAS**2
     denies_along = np.square(apart.value) > denied * apart.variance
     same_way = surface.value * fragments.value > 0
     same_side = (fragments.rest * surface.rest).sum(axis=1) > 0

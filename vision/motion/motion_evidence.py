@@ -12,6 +12,7 @@ from config.perception import DepthNoise
 from hal.compiled import compiled
 from hal.types import Flags, FloatArray, Integers, Matrices, Matrix, Vector
 from vision.bodies import sightings
+from vision.bodies.rim_motion import RimVelocities
 from vision.bodies.tracks import Tracks
 from vision.depth.depth_noise import depth_sigma_m
 from vision.detection import Detection
@@ -45,6 +46,7 @@ class MotionEvidence:
     size_m: largest extent of the surface.
     velocity_measured_s: for how long the centre has measured the velocity without a break.
     rim_mps: speed across the line of sight by its free rims, 0 where they show none.
+    rim_sigmas: how many standard deviations rim_mps is from zero.
     rim_s: for how long they have shown motion without a break.
     view_radps: how fast the viewing direction changes.
     growth_mps: speed of the centre that a growing or shrinking visible part can explain.
@@ -75,6 +77,7 @@ class MotionEvidence:
     size_m: Vector
     velocity_measured_s: Vector
     rim_mps: Vector
+    rim_sigmas: Vector
     rim_s: Vector
     view_radps: Vector
     growth_mps: Vector
@@ -93,12 +96,12 @@ def evidence_of(
     advances: NDArray[np.bool_],
     arrived: NDArray[np.intp],
     cells: NDArray[np.intp],
-    rim_mps: FloatArray,
+    rims: RimVelocities,
     noise: DepthNoise,
 ) -> MotionEvidence:
     """Gather the evidence of this frame; the filters of tracks have to be updated before.
 
-    body: velocities of the tracks by their fragments. advances, arrived, cells, rim_mps (T,): see
+    body, rims: velocities of the tracks by their fragments and free rims. advances, arrived, cells (T,): see
     MotionEvidence.
     """
     rotation = detection.pose.rotation
@@ -122,7 +125,8 @@ def evidence_of(
         cells=cells,
         size_m=tracks.extent_m.max(axis=1),
         velocity_measured_s=tracks.velocity_measured_s,
-        rim_mps=rim_mps,
+        rim_mps=rims.mps,
+        rim_sigmas=rims.sigmas,
         rim_s=np.abs(tracks.rim_s),
         growth_mps=tracks.growth_mps,
         up=sightings.floor_normal(detection),

@@ -89,12 +89,12 @@ def test_what_stands_and_is_uncovered_never_moves() -> None:
 
 
 def test_rims_are_not_compared_across_a_frame_whose_camera_motion_is_noisy() -> None:
-    """The same as he comes out, but in frame 12 few fragments fit one motion of the camera."""
+    """The same as he comes out, but in frame 10 few fragments fit one motion of the camera."""
     shelf = plate(2.0, (-1.5, 0.0), (-1.2, 1.2))
     tracker = Tracker(PerceptionConfig(), body_height_m=1.5, clearance_m=0.05)
     for frame in range(15):
         seen = detection(grid_of(nearest(walker(-0.25 + way_m(frame)), shelf)), frame)
-        if frame == 12:
+        if frame == 10:
             seen = replace(seen, reckoned=False, blurred=True)
         percept = tracker.step(seen, None)
     assert not moving(percept)

@@ -2,10 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pytest
 
-from tests.support.judging import ACROSS, ALONG, SETTINGS, Speed, by_rim, by_surface, rises, surface
+from tests.support.judging import (
+    ACROSS,
+    ALONG,
+    SETTINGS,
+    Speed,
+    by_rim,
+    by_surface,
+    covariance,
+    rises,
+    surface,
+)
 from vision.bodies.judgement import judge
 
 
@@ -29,6 +42,18 @@ def test_free_rims_that_go_one_way_long_enough_prove_motion() -> None:
     assert not rises(by_rim(rim_s=0.1))
     assert not rises(by_rim(0.2))  # slower than 0.21 m/s
     assert not rises(by_rim(2.5))  # faster than anything
+
+
+def test_free_rims_of_one_frame_prove_a_motion_that_the_filter_shows_too() -> None:
+    # 0.64 / 0.0789 = 8.1, more than half of 16.
+    knows: dict[str, Any] = {"rim_s": 0.0, "covariance": covariance(0.078)}
+    assert rises(by_rim(**knows))
+    assert rises(by_rim(**knows, rim_sigmas=np.array([2.6])))
+    assert not rises(by_rim(**knows, rim_sigmas=np.array([2.4])))
+    assert not rises(by_rim(**{**knows, "covariance": covariance(0.08)}))  # 7.9
+    assert not rises(by_rim(0.2, **knows))  # slower than 0.21 m/s
+    assert not rises(by_rim(**knows, size_m=np.array([2.3])))
+    assert not rises(replace(by_rim(**knows), velocity=np.array([ALONG])))
 
 
 def test_free_rims_prove_nothing_for_what_is_large_or_that_a_new_viewpoint_explains() -> None:

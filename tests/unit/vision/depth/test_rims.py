@@ -68,6 +68,16 @@ def test_the_border_of_the_image_is_no_rim() -> None:
     assert sides(depth_m) == [False, True]
 
 
+@pytest.mark.parametrize(("cells", "free"), [(1, False), (10, False), (11, True)])
+def test_the_border_of_the_depth_cameras_view_is_no_rim(cells: int, free: bool) -> None:
+    """Up to an eighth of 80 columns: a wall that is cut there would go as the camera turns."""
+    depth_m = wall(6.0)
+    depth_m[10:30, :40] = 4.0
+    depth_m[:, :cells] = 0.0
+    assert sides(depth_m) == [free, True]
+    assert sides(depth_m[:, ::-1].copy()) == [True, free]
+
+
 def test_holes_inside_a_part_are_no_rims() -> None:
     depth_m = nearest(BODY, wall(6.0))
     middle = (COLUMNS.min() + COLUMNS.max()) // 2
