@@ -110,8 +110,9 @@ class ViewMemory:
     ) -> tuple[BoolGrid, float]:
         """Cells of mask (h, w) whose surface was surely at this place about wanted_s ago; how long ago.
 
-        Half of the margin of changes, and the majority of neighbours: a person 0.2 m before a wall is told
-        from it up to 3.5 m away. No cells, and 0.0 s, if there is no view of that time.
+        Stricter than changes, by half of its margin and the majority of the neighbours: a person 0.2 m in
+        front of a wall is distinguished from it up to 3.5 m away. No cells, and 0.0 s, if there is no view of
+        that time.
         """
         memory = self._memory_of(now_ns, wanted_s)
         if memory is None:

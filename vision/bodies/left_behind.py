@@ -29,14 +29,14 @@ from vision.detection import Detection
 from vision.numerics.pose_axes import inner_vector
 from vision.numerics.relative_pose import NEAREST_M
 
-# The foot that a walker stands on stays for up to 0.7 s, and is his own.
+# Longer than the foot that a walker stands on stays where it is, 0.7 s: it belongs to him.
 _LOOK_BACK_S = 1.0
 _MIN_DISPLACEMENT_M = 0.4  # half the width of a body: after less it still covers most of its former place
-_SAME_DEPTH_M = 0.3  # by so much the depth of one body differs from place to place
-_MAX_STEPS = 10  # of 0.4 m: no body is longer
+_SAME_DEPTH_M = 0.3  # maximum difference in depth between two places on one body
+_MAX_STEPS = 10  # of _MIN_DISPLACEMENT_M or more: no body is longer
 _SPEED_SHARES = (0.8, 1.0, 1.1)  # the true speed, as a share of the filtered one
-# A smaller share of a track is scraps that noise makes. If more than the larger share has stayed, the mover
-# itself cannot be told from the wall behind it.
+# Less than the first share of a track is noise. If more than the second has stayed, the mover itself is too
+# close to a wall to be distinguished from it.
 _LEAST_SHARE, _MOST_SHARE = 0.1, 0.7
 _SIGMA_M = 0.2  # of the position of a new track
 
