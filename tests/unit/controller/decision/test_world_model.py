@@ -48,6 +48,13 @@ def test_body_where_one_stood_before_keeps_its_age() -> None:
     assert age_s(0.1, 2.0) == 2.0
 
 
+@pytest.mark.parametrize(("frames", "known"), [(5, False), (7, True)])
+def test_only_what_stood_there_200_ms_before_is_known(frames: int, known: bool) -> None:
+    """The frames are 33 ms apart."""
+    bodies = after(*CRATE[:frames], (obstacle(4.0, 0.1, age_s=0.03, number=6),)).bodies
+    assert (bodies.age_s[bodies.ids == 6].item() >= 0.5) == known
+
+
 def test_who_has_a_new_number_keeps_the_age_in_the_frames_that_follow() -> None:
     renumbered = [(obstacle(4.0, 0.1, age_s=0.033 * k, number=6),) for k in range(1, 12)]
     assert after(*CRATE, *renumbered).bodies.age_s.item() == 0.5
