@@ -46,7 +46,7 @@ ARRIVED_CELLS, ARRIVED_SHARE = 8, 0.05
 MUCH_ARRIVED_CELLS = 20  # about a forearm 4 m away
 MUCH_ARRIVED_SHARE = 0.2  # more than a rim that noise widens
 _UNKNOWN = np.float32(1e3)  # 1/m, where nothing was measured: no surface is nearer, so none can arrive there
-_BLOCK = np.ones((3, 3), np.uint8)
+NEIGHBOURHOOD = np.ones((3, 3), np.uint8)  # of a cell: the cells that can confirm it
 
 
 def arriving(arrived: NDArray[np.intp], cells: NDArray[np.intp]) -> NDArray[np.bool_]:
@@ -111,8 +111,8 @@ class ViewMemory:
         """Cells of mask (h, w) whose surface was surely at this place about wanted_s ago; how long ago.
 
         Stricter than changes, by half of its margin and the majority of the neighbours: a person 0.2 m in
-        front of a wall is distinguished from it up to 3.5 m away. No cells, and 0.0 s, if there is no view of
-        that time.
+        front of a wall is distinguished from it up to 3.5 m away. Only neighbours in mask confirm a cell. No
+        cells, and 0.0 s, if there is no view of that time.
         """
         memory = self._memory_of(now_ns, wanted_s)
         if memory is None:
@@ -135,7 +135,7 @@ class ViewMemory:
         cv2.copyTo(grid.inverse_depth, grid.valid.view(np.uint8), nearest)
         # Where the measured depth is beyond the range, space was seen free up to the range, no farther.
         nearest[grid.beyond] = np.float32(1.0 / grid.range_m)
-        cv2.dilate(nearest, _BLOCK, nearest)
+        cv2.dilate(nearest, NEIGHBOURHOOD, nearest)
         self._memories.append(_Memory(now_ns, pose, nearest, grid.inverse_depth))
         horizon_ns = now_ns - int(1e9 * _KEPT_FOR_S)
         self._memories = [m for m in self._memories if m.stamp_ns >= horizon_ns]

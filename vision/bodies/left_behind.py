@@ -10,13 +10,14 @@ vision/tracker.py calls it after carving (vision/bodies/carving.py). Terms: visi
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import DepthNoise, PerceptionConfig
 from hal.compiled import compiled, inlined
 from hal.types import FloatArray, Pose
-from vision.bodies.arrivals import ViewMemory
+from vision.bodies.arrivals import NEIGHBOURHOOD, ViewMemory
 from vision.bodies.births import MIN_CELLS
 from vision.bodies.division import SINGLE_WIDTH_M
 from vision.bodies.tracks import Tracks
@@ -59,11 +60,13 @@ def part(
     if not asked.any():
         return labels
     grid, pose, now_ns = detection.grid, detection.pose, detection.captured_ns
-    stayed, stayed_s = memory.stayed(grid, mask, pose, now_ns, _LOOK_BACK_S)
+    on_mover = _on_mover(labels, tracks.moving)
+    around = mask & cv2.dilate(on_mover.view(np.uint8), NEIGHBOURHOOD).view(np.bool_)
+    stayed, stayed_s = memory.stayed(grid, around, pose, now_ns, _LOOK_BACK_S)
     gone = asked & (tracks.speed_mps * stayed_s >= _MIN_DISPLACEMENT_M)
     if not gone.any():
         return labels
-    left = _left_behind(grid, labels, stayed, tracks.state[:, 3:] * stayed_s, gone, tracks.moving, pose)
+    left = _left_behind(grid, labels, on_mover, stayed, tracks.state[:, 3:] * stayed_s, gone, pose)
     cells = np.bincount(left.ravel(), minlength=len(gone) + 1)[1:]
     of_track = np.bincount(labels.ravel(), minlength=len(gone) + 1)[1:]
     parted = (cells >= np.maximum(MIN_CELLS, _LEAST_SHARE * of_track)) & (cells <= _MOST_SHARE * of_track)
@@ -121,25 +124,33 @@ def _was_there(
     return True
 
 
-@compiled(DepthGrid, "int32[:, ::1], boolean[:, ::1], float64[:, :], boolean[::1], boolean[::1]", Pose)
+@compiled("int32[:, ::1], boolean[::1]")
+def _on_mover(labels: IntGrid, moving: NDArray[np.bool_]) -> BoolGrid:
+    """(h, w) cells of the tracks that move (T,)."""
+    height, width = labels.shape
+    result = np.zeros((height, width), np.bool_)
+    for i in range(height):
+        for j in range(width):
+            result[i, j] = labels[i, j] > 0 and moving[labels[i, j] - 1]
+    return result
+
+
+@compiled(DepthGrid, "int32[:, ::1], boolean[:, ::1], boolean[:, ::1], float64[:, :], boolean[::1]", Pose)
 def _left_behind(
     grid: DepthGrid,
     labels: IntGrid,
+    on_mover: BoolGrid,
     stayed: BoolGrid,
     displacement_m: FloatArray,
     gone: NDArray[np.bool_],
-    moving: NDArray[np.bool_],
     pose: Pose,
 ) -> IntGrid:
     """(h, w) track index + 1 of the cells in stayed (h, w) at whose place their track was not then.
 
-    displacement_m (T, 3): of the tracks since then. gone (T,): tracks that are looked at. moving (T,).
+    on_mover (h, w): cells of tracks that move. displacement_m (T, 3): of the tracks since then. gone (T,):
+    tracks that are looked at.
     """
     height, width = labels.shape
-    on_mover = np.zeros((height, width), np.bool_)
-    for i in range(height):
-        for j in range(width):
-            on_mover[i, j] = labels[i, j] > 0 and moving[labels[i, j] - 1]
     result, moved_m = np.zeros((height, width), np.int32), np.zeros(displacement_m.shape)
     for t in range(len(gone)):
         moved_m[t] = inner_vector(pose, displacement_m[t])
