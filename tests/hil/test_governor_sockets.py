@@ -52,7 +52,7 @@ def test_the_client_of_the_documentation_drives_and_its_silence_stops(kind: str,
         ready = next(line for line in process.stdout if line.startswith("ready"))
         assert ready == f"ready: commands are heard on {'udp ' if kind == 'udp' else ''}{where}\n"
         client = subprocess.run(
-            [sys.executable, str(tmp_path / "client.py"), where, "3.0"],
+            [sys.executable, str(tmp_path / "client.py"), where, "6.0"],
             capture_output=True, text=True, timeout=30, check=True,
         )  # fmt: skip
         silence = next(line for line in process.stdout if "no command for" in line)
