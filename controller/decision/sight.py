@@ -69,6 +69,7 @@ class Sight:
         self._assumed_free_s_m = start_s_m + mount.forward_m + self._near_m + _CELL_M
         self._nearest: deque[float] = deque(maxlen=_FRAMES)
         self._held_s_m = self._closest_s_m = math.inf
+        self._seen_at_rest = False
         self.surface_s_m = self.surface_clearance_m = math.inf
         self.known_s_m = self._assumed_free_s_m
         self.corners = BlindCorners(config.sight)
@@ -137,12 +138,17 @@ class Sight:
         steady = sorted(self._nearest)[len(self._nearest) // 2]
         # A surface that leaves the view below, above or beside it because the robot drives on is still there,
         # so it is held. A long wall beside the corridor leaves the view little by little: its nearest visible
-        # point recedes as fast as the robot drives. One that vanishes while the robot stands has gone away.
+        # point recedes as fast as the robot drives. The robot may come to rest only later, where a low sill
+        # has long been below the view.
         blind_s_m = s_m + self._mount.forward_m + self._out_of_view_within_m
-        if standing or self._held_s_m < s_m:
-            self._held_s_m = math.inf
-        elif steady > self._closest_s_m + _RECEDES_M and self._closest_s_m < blind_s_m:
+        if not standing and steady > self._closest_s_m + _RECEDES_M and self._closest_s_m < blind_s_m:
             self._held_s_m = min(self._held_s_m, self._closest_s_m)
+        # What was seen about there while the robot stands, and then vanishes, has gone away.
+        seen_there = standing and steady <= self._held_s_m + _SAME_SURFACE_M
+        gone = standing and self._seen_at_rest and not seen_there
+        if gone or self._held_s_m < s_m:
+            self._held_s_m = math.inf
+        self._seen_at_rest = seen_there
         keeps = not standing and s_m < self._closest_s_m < blind_s_m
         self._closest_s_m = min(steady, self._closest_s_m) if keeps else steady
         self.surface_s_m = min(steady, self._held_s_m)
