@@ -1,4 +1,4 @@
-"""A surface that leaves the view while the robot drives is held; at rest, only one that was there for long."""
+"""A surface that leaves the view while the robot drives is held; at rest, only one that was there long."""
 
 from __future__ import annotations
 
