@@ -115,11 +115,16 @@ class Tracks:
         return indices_of(self.ids, ids)
 
     def start(
-        self, position_m: FloatArray, sigma_m: float, max_speed_mps: float, evidence: float, now_ns: int
+        self,
+        position_m: FloatArray,
+        sigma_m: float,
+        max_speed_mps: float,
+        evidence: FloatArray | float,
+        now_ns: int,
     ) -> None:
         """Begin tracks at positions (K, 3), known to sigma_m, with unknown velocity.
 
-        Its mean is 0 and its standard deviation is max_speed_mps.
+        Its mean is 0 and its standard deviation is max_speed_mps. evidence: score of each, (K,), or of all.
         """
         count = len(position_m)
         given: dict[str, object] = {
