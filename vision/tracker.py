@@ -50,7 +50,6 @@ from vision.scene import CameraCondition, FreeSpace, Scene
 _ACCEL_DENSITY = 0.08  # (m/s^2)^2 s, as people start, stop and turn: a sigma of 0.28 m/s after 1 s
 _FORGET_S = 0.5  # a mover behind a post is visible again by then; the decision remembers for longer
 _FORGET_YOUNG_S = 0.15  # a few frames, for a track that was hardly seen: it is taken for a speckle
-_LONG_AGO_NS = 10**9  # age of the last sighting of a track that is to be forgotten now: above _FORGET_S
 
 
 class Tracker:
@@ -92,7 +91,7 @@ class Tracker:
             owner = self._update_tracks(detection, above_floor, owner, velocities, elapsed_s)
         unseen_s = (detection.captured_ns - tracks.seen_ns) * 1e-9
         young = tracks.sightings < report.MIN_SIGHTINGS
-        tracks.keep(unseen_s <= np.where(young, _FORGET_YOUNG_S, _FORGET_S))
+        tracks.keep(~tracks.merged_away & (unseen_s <= np.where(young, _FORGET_YOUNG_S, _FORGET_S)))
         self._fragment_ids, self._fragment_owner = detection.ids, owner
         return self._percept(detection, above_floor, owner, velocities, robot_pose)
 
@@ -201,7 +200,7 @@ class Tracker:
         )
         displacement_m = tracks.speed_mps * changes.stayed_s
         labels, gone = merging.merge_labels(grid, labels, pairs, changes.stayed, displacement_m)
-        tracks.seen_ns[gone] = detection.captured_ns - _LONG_AGO_NS
+        tracks.merged_away[gone] = True
         visible = (may_be_two & (measured.cells > 0)).nonzero()[0]
         seconds = division.second_bodies(grid, labels, visible, changes.stayed, displacement_m)
         for number, (track, cells) in enumerate(seconds, start=len(tracks) + 1):

@@ -62,6 +62,7 @@ class Tracks:
     nearly_hidden: Flags = _column(np.bool_)  # a mover of which only a small rest was visible
     # A mover without an edge in depth to the static surface beside it: where it ends there is a guess.
     border_is_guess: Flags = _column(np.bool_)
+    merged_away: Flags = _column(np.bool_)  # joined to another track, so it ends with this frame
     overhead: Flags = _column(np.bool_)  # seen only above the robot's height; the rest is out of sight
     # The verdict (vision/bodies/judgement.py).
     evidence: Vector = _column(float)  # the score it rests on
