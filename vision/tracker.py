@@ -31,7 +31,9 @@ from vision.bodies import (
 )
 from vision.bodies.adoption import adopt, inherited
 from vision.bodies.arrivals import Changes, ViewMemory, arriving
-from vision.bodies.judgement import IMPLAUSIBLE_SPEED_FACTOR, judge
+from vision.bodies.few_fragments import bodies_needing_fragments
+from vision.bodies.judgement import judge
+from vision.bodies.motion_evidence import evidence_of
 from vision.bodies.tracks import Tracks
 from vision.depth import connected, occlusion, regions
 from vision.depth.connected import IntGrid
@@ -40,12 +42,10 @@ from vision.depth.free_space import free_space
 from vision.depth.near_floor import NearFloor
 from vision.depth.regions import Regions
 from vision.detection import Detection
-from vision.fragments.attention import bodies_needing_fragments
 from vision.motion import least_squares, limbs
 from vision.motion.least_squares import FragmentVelocities
-from vision.motion.motion_evidence import evidence_of
 from vision.percept import Percept
-from vision.scene import CameraCondition, FreeSpace, Scene
+from vision.scene import IMPLAUSIBLE_SPEED_FACTOR, CameraCondition, FreeSpace, Scene
 
 _ACCEL_DENSITY = 0.08  # (m/s^2)^2 s, as people start, stop and turn: a sigma of 0.28 m/s after 1 s
 _FORGET_S = 0.5  # a mover behind a post is visible again by then; the decision remembers for longer
@@ -280,7 +280,7 @@ class Tracker:
         return Percept(
             scene,
             report.fragments(detection, owner, moving, velocities),
-            bodies_needing_fragments(tracks, detection, self._config),
+            bodies_needing_fragments(tracks, detection, self._config.depth_noise),
         )
 
     def _free_space(self, detection: Detection, above_floor: BoolGrid) -> FreeSpace:

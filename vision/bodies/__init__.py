@@ -19,8 +19,10 @@ Files, in the order in which they come into play within one frame (vision/tracke
 * sightings - the Kalman filters are updated by the centroids of the visible surfaces.
 * rim_motion - the speed of half hidden bodies by their free rims.
 * adoption - each fragment is assigned to a track.
+* motion_evidence - all evidence of one frame, for the verdict.
 * proof - what one frame proves of each track: moving, standing still or neither.
 * proof_rules - the rules for that, one function each.
 * judgement - the proofs are added up over frames to a verdict with hysteresis.
 * report - tracks and fragments are written into the Scene.
+* few_fragments - bodies at which the next frame looks more closely.
 """

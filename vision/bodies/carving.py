@@ -30,7 +30,6 @@ from vision.bodies.births import MIN_CELLS
 from vision.bodies.cutting import Cut
 from vision.bodies.division import SINGLE_WIDTH_M
 from vision.bodies.ends import near_ends
-from vision.bodies.judgement import IMPLAUSIBLE_SPEED_FACTOR
 from vision.bodies.tracks import Tracks
 from vision.depth import connected
 from vision.depth.connected import IntGrid
@@ -41,6 +40,7 @@ from vision.detection import Detection
 from vision.motion import candidates
 from vision.motion.least_squares import FragmentVelocities
 from vision.numerics.order import median
+from vision.scene import IMPLAUSIBLE_SPEED_FACTOR
 
 # Score at the start. It is used up in 0.09 s where nothing speaks for motion, in 0.6 s where something does.
 SUSPECT_EVIDENCE = 0.3

@@ -44,8 +44,9 @@ from numpy.typing import NDArray
 from config.perception import MotionSettings
 from hal.compiled import compiled
 from hal.types import FloatArray
+from vision.bodies.motion_evidence import MotionEvidence
 from vision.bodies.proof import Proof, prove
-from vision.motion.motion_evidence import MotionEvidence
+from vision.scene import IMPLAUSIBLE_SPEED_FACTOR
 
 # Time in which the weakest proof raises the score by 1: two frames at 30 a second. With three frames the
 # first detection came 0.07 s later.
@@ -59,7 +60,6 @@ _FALL_S = 0.30  # without proof: in some frames a moving body gives none
 _HOLD_S = 2.0  # without new proof, while the motion seems to go on
 _STOP_S = 0.12  # with proof that the motion is over
 _MAX_EVIDENCE = 1.5  # 1.5 times what a verdict needs, so that no mover is held for much longer
-IMPLAUSIBLE_SPEED_FACTOR = 1.6  # times the maximum speed: faster things are mistakes
 _SURE_SQUARED_SIGMAS = 30.0  # 5.5 sigmas give a confidence of 0.63; the weakest proof gives 0.4
 
 

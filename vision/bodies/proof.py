@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from config.perception import MotionSettings
 from hal.compiled import compiled, inlined
 from hal.types import Flags, FloatArray, Vector
+from vision.bodies.motion_evidence import MotionEvidence
 from vision.bodies.proof_rules import (
     ENDS_ACROSS,
     EVEN_CELLS,
@@ -34,7 +35,6 @@ from vision.bodies.proof_rules import (
     stands_surely,
 )
 from vision.motion.line_of_sight import SecondOpinion, Split, decompose, second_opinion
-from vision.motion.motion_evidence import MotionEvidence
 
 BoolArray = NDArray[np.bool_]
 
