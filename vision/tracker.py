@@ -1,10 +1,10 @@
 """track: a Detection becomes the Scene, with bodies of stable id and filtered velocity, moving or static.
 
 Steps, with their modules: velocities of fragments (least_squares); arrived and stayed surfaces (arrivals);
-cells to tracks (masks, connected, votes, grouping, births); suspects cut out (carving); movers extended to
-the floor (grounding); bodies joined and divided (merging, division); filters (sightings, rim_motion);
-fragments to tracks (adoption); velocities of bodies (least_squares); verdict (judgement); report. Terms:
-vision/__init__.py.
+cells to tracks (masks, connected, votes, grouping, births); suspects and furniture cut out (carving,
+left_behind, cutting); movers extended to the floor (grounding); bodies joined and divided (merging,
+division); filters (sightings, rim_motion); fragments to tracks (adoption); velocities of bodies
+(least_squares); verdict (judgement); report. Terms: vision/__init__.py.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from hal.types import FloatArray, PlanarPose
 from vision.bodies import (
     births,
     carving,
+    cutting,
     division,
     grounding,
     grouping,
@@ -30,26 +31,25 @@ from vision.bodies import (
 )
 from vision.bodies.adoption import adopt, inherited
 from vision.bodies.arrivals import Changes, ViewMemory, arriving
-from vision.bodies.judgement import IMPLAUSIBLE_SPEED_FACTOR, judge
+from vision.bodies.few_fragments import bodies_needing_fragments
+from vision.bodies.judgement import judge
+from vision.bodies.motion_evidence import evidence_of
 from vision.bodies.tracks import Tracks
 from vision.depth import connected, occlusion, regions
 from vision.depth.connected import IntGrid
-from vision.depth.depth_grid import BoolGrid
+from vision.depth.depth_grid import BoolGrid, DepthGrid
 from vision.depth.free_space import free_space
 from vision.depth.near_floor import NearFloor
 from vision.depth.regions import Regions
 from vision.detection import Detection
-from vision.fragments.attention import bodies_needing_fragments
 from vision.motion import least_squares, limbs
 from vision.motion.least_squares import FragmentVelocities
-from vision.motion.motion_evidence import evidence_of
 from vision.percept import Percept
-from vision.scene import CameraCondition, FreeSpace, Scene
+from vision.scene import IMPLAUSIBLE_SPEED_FACTOR, CameraCondition, FreeSpace, Scene
 
 _ACCEL_DENSITY = 0.08  # (m/s^2)^2 s, as people start, stop and turn: a sigma of 0.28 m/s after 1 s
 _FORGET_S = 0.5  # a mover behind a post is visible again by then; the decision remembers for longer
 _FORGET_YOUNG_S = 0.15  # a few frames, for a track that was hardly seen: it is taken for a speckle
-_LONG_AGO_NS = 10**9  # age of the last sighting of a track that is to be forgotten now: above _FORGET_S
 
 
 class Tracker:
@@ -91,7 +91,7 @@ class Tracker:
             owner = self._update_tracks(detection, above_floor, owner, velocities, elapsed_s)
         unseen_s = (detection.captured_ns - tracks.seen_ns) * 1e-9
         young = tracks.sightings < report.MIN_SIGHTINGS
-        tracks.keep(unseen_s <= np.where(young, _FORGET_YOUNG_S, _FORGET_S))
+        tracks.keep(~tracks.merged_away & (unseen_s <= np.where(young, _FORGET_YOUNG_S, _FORGET_S)))
         self._fragment_ids, self._fragment_owner = detection.ids, owner
         return self._percept(detection, above_floor, owner, velocities, robot_pose)
 
@@ -136,25 +136,25 @@ class Tracker:
     ) -> tuple[IntGrid, IntGrid, Regions]:
         """Assign cells to tracks: labels (h, w), track index + 1; the same with movers extended to the floor;
         and the regions of the tracks with that. The cells of the extension do not vote in the next frame."""
-        tracks, grid, noise = self._tracks, detection.grid, self._config.depth_noise
+        tracks, grid = self._tracks, detection.grid
         labels = self._claim(detection, above_floor, changes, elapsed_s)
         measured = regions.measure(grid, labels, len(tracks))
-        known = len(tracks)
-        carved = carving.carve(tracks, detection, labels, measured, changes, velocities, self._config)
-        carved = left_behind.part(tracks, detection, above_floor, carved, measured, self._free, self._config)
-        tracks.border_is_guess[known:] = tracks.mover[known:]
-        if carved is not labels:
-            measured = regions.measure(grid, carved, len(tracks))
-        whole, upright = grounding.extend_to_floor(
-            grid, carved, measured, tracks.border_is_guess, tracks.mover, noise
-        )
-        labels = self._regroup(detection, carved, upright, changes)
-        if labels is not carved:
-            measured = regions.measure(grid, labels, len(tracks))
-            whole, upright = grounding.extend_to_floor(
-                grid, labels, measured, tracks.border_is_guess, tracks.mover, noise
-            )
+        cuts = carving.cuts(tracks, detection, labels, measured, changes, velocities, self._config)
+        rest = cutting.without(labels, cuts)
+        cuts += left_behind.cuts(tracks, detection, above_floor, rest, measured, self._free, self._config)
+        max_mps = self._config.motion.max_speed_mps
+        labels, measured = cutting.cut_out(tracks, detection, labels, measured, cuts, max_mps)
+        whole, upright = self._grounded(grid, labels, measured)
+        regrouped = self._regroup(detection, labels, upright, changes)
+        if regrouped is not None:
+            labels = regrouped
+            whole, upright = self._grounded(grid, labels, regions.measure(grid, labels, len(tracks)))
         return labels, whole, upright
+
+    def _grounded(self, grid: DepthGrid, labels: IntGrid, measured: Regions) -> tuple[IntGrid, Regions]:
+        """labels (h, w), and their regions measured, with movers extended to the floor."""
+        tracks, noise = self._tracks, self._config.depth_noise
+        return grounding.extend_to_floor(grid, labels, measured, tracks.border_is_guess, tracks.mover, noise)
 
     def _claim(
         self, detection: Detection, above_floor: BoolGrid, changes: Changes, elapsed_s: float
@@ -186,26 +186,28 @@ class Tracker:
         )
         return votes.divide(parts, predicted, ballot, winner)
 
-    def _regroup(self, detection: Detection, labels: IntGrid, measured: Regions, changes: Changes) -> IntGrid:
-        """Join tracks that are one body and divide those that are two; the same labels if there are none."""
+    def _regroup(
+        self, detection: Detection, labels: IntGrid, measured: Regions, changes: Changes
+    ) -> IntGrid | None:
+        """Join tracks that are one body and divide those that are two: labels then; None: there are none."""
         tracks, grid = self._tracks, detection.grid
         may_be_two = tracks.moving | (tracks.restless_s > 0.0)
         if not may_be_two.any():
-            return labels
+            return None
         mover = tracks.mover
         pairs = merging.pairs_to_merge(
             grid, measured, tracks.state[:, 3:], tracks.velocity_sigma_mps, mover, tracks.moving
         )
         displacement_m = tracks.speed_mps * changes.stayed_s
         labels, gone = merging.merge_labels(grid, labels, pairs, changes.stayed, displacement_m)
-        tracks.seen_ns[gone] = detection.captured_ns - _LONG_AGO_NS
-        for track in (may_be_two & (measured.cells > 0)).nonzero()[0].tolist():
-            second = division.second_body(grid, labels, track, changes.stayed, float(displacement_m[track]))
-            if second is not None:
-                tracks.start_from(track, carving.SUSPECT_EVIDENCE, detection.captured_ns)
-                labels = labels.copy()
-                labels.ravel()[second] = len(tracks)
-        return labels
+        tracks.merged_away[gone] = True
+        visible = (may_be_two & (measured.cells > 0)).nonzero()[0]
+        seconds = division.second_bodies(grid, labels, visible, changes.stayed, displacement_m)
+        for number, (track, cells) in enumerate(seconds, start=len(tracks) + 1):
+            tracks.start_from(track, carving.SUSPECT_EVIDENCE, detection.captured_ns)
+            labels = labels.copy()
+            labels.ravel()[cells] = number
+        return labels if gone or seconds else None
 
     def _measure_velocities(
         self,
@@ -278,7 +280,7 @@ class Tracker:
         return Percept(
             scene,
             report.fragments(detection, owner, moving, velocities),
-            bodies_needing_fragments(tracks, detection, self._config),
+            bodies_needing_fragments(tracks, detection, self._config.depth_noise),
         )
 
     def _free_space(self, detection: Detection, above_floor: BoolGrid) -> FreeSpace:

@@ -51,8 +51,7 @@ from controller.decision.view_edges import ViewEdges, out_of_view
 from hal.clocks import NS_PER_S
 from hal.compiled import compiled
 from hal.types import CameraMount, FloatArray, PlanarPose
-from vision.bodies.judgement import IMPLAUSIBLE_SPEED_FACTOR
-from vision.scene import FreeSpace
+from vision.scene import IMPLAUSIBLE_SPEED_FACTOR, FreeSpace
 
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.int64]

@@ -11,9 +11,9 @@ from hal.types import CameraMount, FloatArray, Intrinsics, Pose, RgbdFrame
 from tests.support.grids import grid_of, plane
 from tests.support.point_motion import matrices, project, static_miss
 from vision.bodies.judgement import judge
+from vision.bodies.motion_evidence import MotionEvidence
 from vision.camera.floor import FloorFinder
 from vision.camera.lens import rays, rotation_from_vector, vector_from_rotation
-from vision.motion.motion_evidence import MotionEvidence
 from vision.motion.velocities import EndResiduals, normal_equations
 from vision.numerics import kalman
 from vision.perception import Perception

@@ -14,7 +14,7 @@ import numpy as np
 from config.perception import MotionSettings
 from hal.types import FloatArray
 from vision.bodies.judgement import Verdict, judge
-from vision.motion.motion_evidence import MotionEvidence
+from vision.bodies.motion_evidence import MotionEvidence
 
 SETTINGS = MotionSettings(max_speed_mps=1.5, min_speed_mps=0.15, sigmas=4.0)
 DT_S = 0.05

@@ -8,9 +8,10 @@ Files, in the order in which they come into play within one frame (vision/tracke
 * votes - the predicted cells vote to which track each connected part belongs.
 * grouping - parts are attached to tracks or detached from them where connected depth says too little.
 * births - new tracks for large parts that no track claims.
-* carving - suspects: possible movers, cut out of a larger track.
+* carving - suspects: possible movers, to be cut out of a larger track.
 * ends - the cells close to the end points of fragments; used by carving.
-* left_behind - furniture that a mover has left is parted from its track.
+* left_behind - furniture that a mover has left, to be parted from its track.
+* cutting - what these two have found becomes tracks of its own.
 * grounding - a mover is extended down to the floor.
 * merging - two tracks that are one body are joined.
 * division - one track that holds two bodies is divided.
@@ -18,8 +19,10 @@ Files, in the order in which they come into play within one frame (vision/tracke
 * sightings - the Kalman filters are updated by the centroids of the visible surfaces.
 * rim_motion - the speed of half hidden bodies by their free rims.
 * adoption - each fragment is assigned to a track.
+* motion_evidence - all evidence of one frame, for the verdict.
 * proof - what one frame proves of each track: moving, standing still or neither.
 * proof_rules - the rules for that, one function each.
 * judgement - the proofs are added up over frames to a verdict with hysteresis.
 * report - tracks and fragments are written into the Scene.
+* few_fragments - bodies at which the next frame looks more closely.
 """

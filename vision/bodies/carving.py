@@ -9,7 +9,9 @@ a track of their own:
 
 Such a track is a suspect. It is looked at more closely (vision/fragments/attention.py). Without further
 evidence it ends, and its cells go back to the track around them. Likewise a mover that has grown over
-something it moves along is cut back to these cells. Terms: vision/__init__.py.
+something it moves along is cut back to these cells.
+
+This module finds the cuts; vision/bodies/cutting.py starts the tracks. Terms: vision/__init__.py.
 """
 
 from __future__ import annotations
@@ -25,11 +27,11 @@ from hal.compiled import compiled
 from hal.types import FloatArray
 from vision.bodies.arrivals import ARRIVED_UP_TO_S, Changes
 from vision.bodies.births import MIN_CELLS
+from vision.bodies.cutting import Cut
 from vision.bodies.division import SINGLE_WIDTH_M
 from vision.bodies.ends import near_ends
-from vision.bodies.judgement import IMPLAUSIBLE_SPEED_FACTOR
 from vision.bodies.tracks import Tracks
-from vision.depth import connected, regions
+from vision.depth import connected
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import BoolGrid, DepthGrid
 from vision.depth.depth_noise import depth_sigma_m, depth_sigma_of
@@ -38,6 +40,7 @@ from vision.detection import Detection
 from vision.motion import candidates
 from vision.motion.least_squares import FragmentVelocities
 from vision.numerics.order import median
+from vision.scene import IMPLAUSIBLE_SPEED_FACTOR
 
 # Score at the start. It is used up in 0.09 s where nothing speaks for motion, in 0.6 s where something does.
 SUSPECT_EVIDENCE = 0.3
@@ -51,7 +54,7 @@ _LEVEL = 0.3  # maximum vertical share of its speed: an end that slides along an
 _BLOCK = np.ones((3, 3), np.uint8)
 
 
-def carve(
+def cuts(
     tracks: Tracks,
     detection: Detection,
     labels: IntGrid,
@@ -59,49 +62,40 @@ def carve(
     changes: Changes,
     velocities: FragmentVelocities,
     config: PerceptionConfig,
-) -> IntGrid:
-    """labels (h, w), track index + 1, with suspects cut out; these are started in tracks.
+) -> list[Cut]:
+    """What is to be cut out: the static rest of overgrown movers, then suspects.
 
-    measured: regions of labels. changes: since earlier frames. velocities: of the fragments of detection. The
-    same labels object is returned where there is nothing to cut out.
+    labels (h, w): track index + 1. measured: regions of labels. changes: since earlier frames. velocities: of
+    the fragments of detection.
     """
     if len(tracks) == 0:
-        return labels
+        return []
     suspicious = candidates.moving_candidates(detection.motion, detection.age_frames).nonzero()[0]
     if len(suspicious) == 0 and not changes.arrived.any():
-        return labels
+        return []
     searched, overgrown = _may_hide_mover(tracks, measured, tracks.mover, config.depth_noise)
     asked = searched | overgrown
     if not asked.any():
-        return labels
+        return []
     search_area = _cells_of(labels, asked)
     moving_cells = changes.arrived & search_area
     moving_cells |= _around_moving_fragments(detection, velocities, suspicious, search_area, config)
     if not moving_cells.any():
-        return labels
+        return []
+    rests = _static_rests(detection.grid, labels, overgrown, moving_cells, changes.stayed, config.depth_noise)
     inside = _cells_of(labels, searched) if overgrown.any() else search_area
-    labels = _cut_back(tracks, detection, labels, overgrown, moving_cells, changes.stayed, config)
-    seeds = moving_cells & inside
+    return rests + _suspects(detection.grid, moving_cells & inside, inside)
+
+
+def _suspects(grid: DepthGrid, seeds: BoolGrid, inside: BoolGrid) -> list[Cut]:
+    """Suspects: seeds (h, w) and the cells of inside (h, w) around them, where enough are connected."""
     widened = cv2.dilate(seeds.view(np.uint8), _BLOCK)
     grown: BoolGrid = np.asarray(widened, np.uint8).view(np.bool_) & inside
     if np.count_nonzero(grown) < MIN_CELLS:
-        return labels
-    suspects, count = _large_components(detection.grid, grown)
-    if count == 0:
-        return labels
-    first = len(tracks)
-    _start(tracks, detection, regions.measure(detection.grid, suspects, count), SUSPECT_EVIDENCE, config)
-    return np.where(suspects > 0, suspects + first, labels).astype(np.int32)
-
-
-def _large_components(grid: DepthGrid, cells: BoolGrid) -> tuple[IntGrid, int]:
-    """Connected components of cells (h, w) with at least MIN_CELLS, labelled from 1; and their number."""
-    count, parts = connected.components(grid, cells)
-    sizes = np.bincount(parts.ravel(), minlength=count + 1)
-    large = (sizes[1:] >= MIN_CELLS).nonzero()[0] + 1
-    number = np.zeros(count + 1, np.int32)
-    number[large] = np.arange(1, len(large) + 1)
-    return number.take(parts), len(large)
+        return []
+    count, parts = connected.components(grid, grown)
+    each = [np.flatnonzero(parts == number) for number in range(1, count + 1)]
+    return [Cut(cells, SUSPECT_EVIDENCE) for cells in each if len(cells) >= MIN_CELLS]
 
 
 @compiled(Tracks, Regions, "boolean[:]", DepthNoise)
@@ -135,34 +129,31 @@ def _cells_of(labels: IntGrid, chosen: NDArray[np.bool_]) -> BoolGrid:
     return result
 
 
-def _cut_back(
-    tracks: Tracks,
-    detection: Detection,
+def _static_rests(
+    grid: DepthGrid,
     labels: IntGrid,
     overgrown: NDArray[np.bool_],
     moving_cells: BoolGrid,
     stayed: BoolGrid,
-    config: PerceptionConfig,
-) -> IntGrid:
-    """labels (h, w) with overgrown movers (T,) reduced to the cells that move (moving_cells, (h, w)).
+    noise: DepthNoise,
+) -> list[Cut]:
+    """Of overgrown movers (T,), all but the cells that move (moving_cells, (h, w)).
 
-    They have grown over furniture they move along. The rest of each begins as a static track. What is as
+    They have grown over furniture they move along, so the rest of each begins as a static track. What is as
     close to the moving cells as parts of one body are, and has not stayed (h, w), goes on with them: a leg
     would stand as a track of its own.
     """
+    rests = []
     for track in overgrown.nonzero()[0].tolist():
         own = labels == track + 1
         widened = np.asarray(cv2.dilate((moving_cells & own).view(np.uint8), _BLOCK), np.uint8)
         kept = widened.view(np.bool_) & own
         if np.count_nonzero(kept) < MIN_CELLS:
             continue
-        rest = own & ~kept & ~(_of_one_body(detection.grid, own, kept, config.depth_noise) & ~stayed)
-        if np.count_nonzero(rest) < MIN_CELLS:
-            continue
-        one = regions.measure(detection.grid, rest.astype(np.int32), 1)
-        _start(tracks, detection, one, 0.0, config)
-        labels = np.where(rest, np.int32(len(tracks)), labels)
-    return labels
+        rest = np.flatnonzero(own & ~kept & ~(_of_one_body(grid, own, kept, noise) & ~stayed))
+        if len(rest) >= MIN_CELLS:
+            rests.append(Cut(rest, 0.0))
+    return rests
 
 
 def _of_one_body(grid: DepthGrid, own: BoolGrid, moving: BoolGrid, noise: DepthNoise) -> BoolGrid:
@@ -177,13 +168,6 @@ def _of_one_body(grid: DepthGrid, own: BoolGrid, moving: BoolGrid, noise: DepthN
     result = np.zeros(own.shape, np.bool_)
     result.ravel()[cells[close]] = True
     return result
-
-
-def _start(
-    tracks: Tracks, detection: Detection, measured: Regions, evidence: float, config: PerceptionConfig
-) -> None:
-    position_m = detection.pose.apply(measured.position_m)
-    tracks.start(position_m, 0.2, config.motion.max_speed_mps, evidence, detection.captured_ns)
 
 
 def _around_moving_fragments(

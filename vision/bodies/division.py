@@ -47,6 +47,20 @@ _MIN_GROUP = 2 * MIN_CELLS  # cells in each of two groups: twice those of a new 
 _BINS = 12  # along the line: 0.1 m each where two people walk side by side
 
 
+def second_bodies(
+    grid: DepthGrid, labels: IntGrid, tracks: NDArray[np.intp], stayed: BoolGrid, displacement_m: FloatArray
+) -> list[tuple[int, NDArray[np.intp]]]:
+    """Those of tracks (K,), indices, that hold two bodies, each with the flat cells of the second one.
+
+    labels (h, w): track index + 1. stayed (h, w), displacement_m (T,): see second_body.
+    """
+    each = (
+        (track, second_body(grid, labels, track, stayed, float(displacement_m[track])))
+        for track in tracks.tolist()
+    )
+    return [(track, cells) for track, cells in each if cells is not None]
+
+
 def second_body(
     grid: DepthGrid, labels: IntGrid, track: int, stayed: BoolGrid, displacement_m: float
 ) -> NDArray[np.intp] | None:

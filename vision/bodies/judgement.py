@@ -1,36 +1,36 @@
 """The verdict moving or static for each track, with hysteresis, from several kinds of proof.
 
-Kinds of proof in one frame, each a rule of vision/bodies/proof_rules.py (threshold: settings.sigmas
-squared; ends: end points of the track's fragments):
+Kinds of proof in one frame, each a rule of vision/bodies/proof_rules.py, which has the thresholds. A velocity
+is clear if it is more than settings.sigmas standard deviations from zero; for a likely one a share of that
+squared threshold suffices.
 
-* Fragments (by_fragments): the velocity over ground, both filtered and by this frame's fragments alone,
-  clearly differs from zero. For level motion across the line of sight, 4 agreeing ends suffice. Along the
-  line of sight 8 are needed, since a few sliding ends look like a change of length. The surface must not
-  contradict (across the line of sight, 8 ends overrule it). Where the surface confirms the velocity, 0.55 of
-  the threshold suffices.
-* Unrest (by_unrest): of 8 ends or more, at least 70 % contradict standing still, though they may agree on
-  no common velocity, as the ends on limbs. The filtered velocity needs to exceed half of the threshold only,
-  after 0.4 s a quarter.
-* Arrival (by_arrival): part of the surface is where free space was seen. Half of the threshold suffices.
-  Where much of the surface has arrived, or some of it in each of several frames, that alone is proof, except
-  for what has just stopped.
+* Fragments (by_fragments): the filtered velocity over ground is clear, and that of this frame's fragments
+  alone supports it. Along the line of sight more ends have to agree than across it, since a few sliding ends
+  look like a change of length. The surface must not contradict, except that many ends overrule it across the
+  line of sight. Where it confirms the velocity, a likely one suffices, since both would have to be wrong in
+  the same way.
+* Unrest (by_unrest): most of many ends contradict standing still, though they may agree on no common
+  velocity, as the ends on limbs. A likely filtered velocity suffices, a less likely one if the unrest lasts
+  for longer than a limb swings one way.
+* Arrival (by_arrival): part of the surface is where free space was seen. A likely velocity suffices. Where
+  much of the surface has arrived, or some of it in each of several frames, that alone is proof, except for
+  what has just stopped: its place was free a moment ago.
 * Surface (by_surface): the centre of a whole, compact surface moves for longer and more clearly than a
   change of viewpoint or a growing surface explains.
-* Free rims (by_rim): the outline of a compact body, where nothing nearer hides it, goes one way for 0.12 s,
-  or confirms by 2.5 sigmas a filtered velocity whose level motion exceeds half of the threshold.
+* Free rims (by_rim): the outline of a compact body, where nothing nearer hides it, goes one way for longer
+  than the outline of something static does, or it confirms a likely level motion of the filter.
 
-All kinds need a known motion of the camera and, except for much arrival, more than the minimum speed. Bodies
-that are implausibly fast or wide prove nothing.
+All kinds need a known motion of the camera and, except where arrival alone is proof, more than the minimum
+speed. Bodies that are implausibly fast or wide prove nothing.
 
-Hysteresis: evidence is a track's score from 0 to 1.5.
+Hysteresis: evidence is a track's score. A track becomes moving at 1 and static again at 0.
 
-* A frame with proof raises it by dt / 0.06 s (0.07 s without odometry) for the weakest proof, by up to 2.5
-  times that for a stronger one, but by 0.5 at most, and by less where the camera's own motion is in doubt.
-* Without proof it falls by dt / 0.30 s, or by dt / 2 s while the motion seems to go on.
-* It falls by dt / 0.12 s where the motion is over: where this frame's fragments, or for a mover the filter,
-  prove that it stands still, or where nothing distinguishes a mover from the static surface around it.
-
-A track becomes moving at 1.0 and static again at 0.
+* A frame with proof raises it: in proportion to its interval, faster the stronger the proof is, slower
+  without odometry, and less where the camera's own motion is in doubt. No single frame proves motion.
+* Without proof it falls slowly, since a moving body gives none in some frames, and even more slowly while the
+  motion seems to go on.
+* It falls fast where the motion is over: where this frame's fragments, or for a mover the filter, prove that
+  it stands still, or where nothing distinguishes a mover from the static surface around it.
 """
 
 from __future__ import annotations
@@ -44,8 +44,9 @@ from numpy.typing import NDArray
 from config.perception import MotionSettings
 from hal.compiled import compiled
 from hal.types import FloatArray
+from vision.bodies.motion_evidence import MotionEvidence
 from vision.bodies.proof import Proof, prove
-from vision.motion.motion_evidence import MotionEvidence
+from vision.scene import IMPLAUSIBLE_SPEED_FACTOR
 
 # Time in which the weakest proof raises the score by 1: two frames at 30 a second. With three frames the
 # first detection came 0.07 s later.
@@ -59,7 +60,6 @@ _FALL_S = 0.30  # without proof: in some frames a moving body gives none
 _HOLD_S = 2.0  # without new proof, while the motion seems to go on
 _STOP_S = 0.12  # with proof that the motion is over
 _MAX_EVIDENCE = 1.5  # 1.5 times what a verdict needs, so that no mover is held for much longer
-IMPLAUSIBLE_SPEED_FACTOR = 1.6  # times the maximum speed: faster things are mistakes
 _SURE_SQUARED_SIGMAS = 30.0  # 5.5 sigmas give a confidence of 0.63; the weakest proof gives 0.4
 
 

@@ -5,7 +5,8 @@ was. A surface of a mover is not its own if it was there a second ago while the 
 elsewhere. Such surfaces become static tracks, which claim them in the frames that follow
 (vision/bodies/votes.py).
 
-vision/tracker.py calls it after carving (vision/bodies/carving.py). Terms: vision/__init__.py.
+It finds the cuts; vision/bodies/cutting.py starts the tracks. vision/tracker.py calls it after carving
+(vision/bodies/carving.py). Terms: vision/__init__.py.
 """
 
 from __future__ import annotations
@@ -19,9 +20,9 @@ from hal.compiled import compiled, inlined
 from hal.types import FloatArray, Pose
 from vision.bodies.arrivals import NEIGHBOURHOOD, ViewMemory
 from vision.bodies.births import MIN_CELLS
+from vision.bodies.cutting import Cut
 from vision.bodies.division import SINGLE_WIDTH_M
 from vision.bodies.tracks import Tracks
-from vision.depth import regions
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import BoolGrid, DepthGrid
 from vision.depth.depth_noise import depth_sigma_m
@@ -39,10 +40,9 @@ _SPEED_SHARES = (0.8, 1.0, 1.1)  # the true speed, as a share of the filtered on
 # Less than the first share of a track is noise. If more than the second has stayed, the mover itself is too
 # close to a wall to be distinguished from it.
 _LEAST_SHARE, _MOST_SHARE = 0.1, 0.7
-_SIGMA_M = 0.2  # of the position of a new track
 
 
-def part(
+def cuts(
     tracks: Tracks,
     detection: Detection,
     mask: BoolGrid,
@@ -50,45 +50,38 @@ def part(
     measured: Regions,
     memory: ViewMemory,
     config: PerceptionConfig,
-) -> IntGrid:
-    """labels (h, w), track index + 1, in which what movers have left behind are static tracks of their own.
+) -> list[Cut]:
+    """What movers have left behind: it becomes static tracks.
 
-    These are started in tracks. mask (h, w): cells above the floor. measured: regions of the first tracks, at
-    least of all that move. The same labels object is returned where nothing is left behind.
+    mask (h, w): cells above the floor. labels (h, w): track index + 1, without the cells that carving cuts
+    out. measured: regions of the tracks, with these cells.
     """
     asked = _wide_movers(tracks, measured, config.depth_noise)
     if not asked.any():
-        return labels
+        return []
     grid, pose, now_ns = detection.grid, detection.pose, detection.captured_ns
     on_mover = _on_mover(labels, tracks.moving)
     around = mask & cv2.dilate(on_mover.view(np.uint8), NEIGHBOURHOOD).view(np.bool_)
     stayed, stayed_s = memory.stayed(grid, around, pose, now_ns, _LOOK_BACK_S)
     gone = asked & (tracks.speed_mps * stayed_s >= _MIN_DISPLACEMENT_M)
     if not gone.any():
-        return labels
+        return []
     left = _left_behind(grid, labels, on_mover, stayed, tracks.state[:, 3:] * stayed_s, gone, pose)
     cells = np.bincount(left.ravel(), minlength=len(gone) + 1)[1:]
     of_track = np.bincount(labels.ravel(), minlength=len(gone) + 1)[1:]
     parted = (cells >= np.maximum(MIN_CELLS, _LEAST_SHARE * of_track)) & (cells <= _MOST_SHARE * of_track)
-    for track in parted.nonzero()[0].tolist():
-        rest = left == track + 1
-        one = regions.measure(grid, rest.astype(np.int32), 1)
-        tracks.start(pose.apply(one.position_m), _SIGMA_M, config.motion.max_speed_mps, 0.0, now_ns)
-        labels = np.where(rest, np.int32(len(tracks)), labels)
-        kept = regions.measure(grid, (labels == track + 1).astype(np.int32), 1)
-        # Its centre jumps without having moved.
-        tracks.reset_position(np.array([track]), pose.apply(kept.position_m), _SIGMA_M**2 * np.eye(3)[None])
-        tracks.trailing_m[track] = tracks.state[track, :3]
-    return labels
+    return [
+        Cut(np.flatnonzero(left == track + 1), 0.0, left_by=track) for track in parted.nonzero()[0].tolist()
+    ]
 
 
 def _wide_movers(tracks: Tracks, measured: Regions, noise: DepthNoise) -> NDArray[np.bool_]:
     """(T,) tracks that go fast enough to leave something behind, and are wider or deeper than one person."""
     extent_m, sigma_m = measured.extent_m, depth_sigma_m(measured.position_m[:, 2], noise)
     wide = (extent_m[:, 0] > SINGLE_WIDTH_M) | (extent_m[:, 2] > SINGLE_WIDTH_M + 2.0 * sigma_m)
-    result = tracks.moving & (tracks.speed_mps * _LOOK_BACK_S >= _MIN_DISPLACEMENT_M)
-    result[len(wide) :] = False
-    result[: len(wide)] &= wide
+    result: NDArray[np.bool_] = (
+        tracks.moving & (tracks.speed_mps * _LOOK_BACK_S >= _MIN_DISPLACEMENT_M) & wide
+    )
     return result
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from config.perception import MotionSettings
 from hal.compiled import compiled, inlined
 from hal.types import Flags, FloatArray, Vector
+from vision.bodies.motion_evidence import MotionEvidence
 from vision.bodies.proof_rules import (
     ENDS_ACROSS,
     EVEN_CELLS,
@@ -33,8 +34,7 @@ from vision.bodies.proof_rules import (
     shown_across,
     stands_surely,
 )
-from vision.motion.line_of_sight import SecondOpinion, decompose, second_opinion
-from vision.motion.motion_evidence import MotionEvidence
+from vision.motion.line_of_sight import SecondOpinion, Split, decompose, second_opinion
 
 BoolArray = NDArray[np.bool_]
 
@@ -70,17 +70,24 @@ class Proof:
 
 
 @inlined
-def _entry(velocity: FloatArray, covariance: FloatArray, parts: FloatArray, k: int, t: int) -> Velocity:
+def _velocity(velocity: FloatArray, covariance: FloatArray, parts: Split, k: int, t: int) -> Velocity:
     """Velocity k of track t with its components; for the arguments see _proofs."""
-    v, c, of = velocity[k, t], covariance[k, t], parts[:, k, t]
-    speed_mps = math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
-    sigma_mps = math.sqrt(c[0, 0] + c[1, 1] + c[2, 2])
-    return Velocity(speed_mps, sigma_mps, of[0], of[1], of[2], of[3], of[4])
+    v, c = velocity[k, t], covariance[k, t]
+    return Velocity(
+        speed_mps=math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]),
+        sigma_mps=math.sqrt(c[0, 0] + c[1, 1] + c[2, 2]),
+        value=parts.value[k, t],
+        along=parts.along[k, t],
+        across=parts.across[k, t],
+        total=parts.total[k, t],
+        level=parts.level[k, t],
+    )
 
 
 @compiled(
     MotionEvidence,
-    "float64[:, :, ::1], float64[:, :, :, ::1], float64[:, :, ::1]",
+    "float64[:, :, ::1], float64[:, :, :, ::1]",
+    Split,
     SecondOpinion,
     "float64[:], boolean[:], float64, float64, float64",
 )
@@ -88,7 +95,7 @@ def _proofs(
     seen: MotionEvidence,
     velocity: FloatArray,
     covariance: FloatArray,
-    parts: FloatArray,
+    parts: Split,
     second: SecondOpinion,
     least_mps: FloatArray,
     moving: BoolArray,
@@ -96,31 +103,46 @@ def _proofs(
     dt_s: float,
     threshold: float,
 ) -> tuple[BoolArray, FloatArray, BoolArray, BoolArray, BoolArray]:
-    """moves to goes_on of Proof. velocity (4, T, 3), covariance (4, T, 3, 3), and parts (5, 4, T), value to
-    level of Split: of the four velocities. threshold: squared sigmas."""
+    """moves, strength, surely_static, over and goes_on of Proof.
+
+    velocity (4, T, 3), covariance (4, T, 3, 3), parts: the four velocities of each track, and their
+    components. threshold: squared sigmas.
+    """
     count = len(moving)
     moves, surely_static = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
     over, goes_on, strength = np.zeros(count, np.bool_), np.zeros(count, np.bool_), np.zeros(count)
     for t in range(count):
-        filtered = _entry(velocity, covariance, parts, _FILTERED, t)
-        frame = _entry(velocity, covariance, parts, _FRAME, t)
-        centre = _entry(velocity, covariance, parts, _SURFACE, t)
+        filtered = _velocity(velocity, covariance, parts, _FILTERED, t)
+        frame = _velocity(velocity, covariance, parts, _FRAME, t)
+        centre = _velocity(velocity, covariance, parts, _SURFACE, t)
         ends, cells, size_m = seen.ends[t], seen.cells[t], seen.size_m[t]
         opinion = Opinion(
-            second.denies_along[t],
-            second.denies_across[t],
-            second.confirms_along[t] and cells >= EVEN_CELLS,
-            second.confirms_across[t],
+            denies_along=second.denies_along[t],
+            denies_across=second.denies_across[t],
+            confirms_along=second.confirms_along[t] and cells >= EVEN_CELLS,
+            confirms_across=second.confirms_across[t],
         )
         alike = seen.agreement[t] * ends
         # Ends that agree on an impossible velocity agree on a mistake, mostly of their depth.
         believed = seen.agreement[t] >= _MIN_AGREEMENT and frame.speed_mps <= fastest_mps
         agreeing = alike if believed else 0.0
-        track_ends = Ends(ends, agreeing, seen.restless[t], seen.restless_s[t])
+        track_ends = Ends(
+            all=ends, agreeing=agreeing, restless=seen.restless[t], restless_s=seen.restless_s[t]
+        )
         turning_mps = _WANDER * seen.view_radps[t] * size_m
-        wander_mps = turning_mps + seen.growth_mps[t]
-        surface = Surface(cells, size_m, seen.velocity_measured_s[t], wander_mps, seen.depth_sigma_m[t])
-        rim = Rim(abs(seen.rim_mps[t]), seen.rim_sigmas[t], seen.rim_s[t], turning_mps)
+        surface = Surface(
+            cells=cells,
+            size_m=size_m,
+            velocity_measured_s=seen.velocity_measured_s[t],
+            wander_mps=turning_mps + seen.growth_mps[t],
+            depth_sigma_m=seen.depth_sigma_m[t],
+        )
+        rim = Rim(
+            speed_mps=abs(seen.rim_mps[t]),
+            sigmas=seen.rim_sigmas[t],
+            shown_s=seen.rim_s[t],
+            wander_mps=turning_mps,
+        )
         arrival = arrival_of(seen.arrived[t], seen.arriving_s[t], cells, dt_s)
         possible = filtered.speed_mps <= fastest_mps and size_m <= _LARGEST_M
         fast = filtered.speed_mps > least_mps[t]
@@ -161,14 +183,14 @@ def prove(
     velocity[_APART] = seen.velocity - seen.surface_velocity
     covariance[_APART] = seen.covariance + seen.surface_covariance
     parts = decompose(velocity, covariance, seen.sight, seen.up)
-    second = second_opinion(parts[_FILTERED], parts[_SURFACE], parts[_APART])
+    second = second_opinion(parts, _FILTERED, _SURFACE, _APART)
     alone_mps = 0.0 if seen.reckoned else _ALONE_MPS
     least_mps = settings.min_speed_mps + alone_mps + _SPEED_PER_METRE * seen.distance_m
-    proofs = _proofs(
+    moves, strength, surely_static, over, goes_on = _proofs(
         seen,
         velocity,
         covariance,
-        np.array((parts.value, parts.along, parts.across, parts.total, parts.level)),
+        parts,
         second,
         least_mps,
         moving,
@@ -176,4 +198,11 @@ def prove(
         dt_s,
         settings.sigmas**2,
     )
-    return Proof(*proofs, parts.total[_FILTERED])
+    return Proof(
+        moves=moves,
+        strength=strength,
+        surely_static=surely_static,
+        over=over,
+        goes_on=goes_on,
+        squared_sigmas=parts.total[_FILTERED],
+    )

@@ -101,7 +101,7 @@ def arrival_of(arrived: int, arriving_s: float, cells: int, dt_s: float) -> Arri
     some = arrived >= ARRIVED_CELLS and arrived >= ARRIVED_SHARE * cells
     lasting = some and arriving_s >= max(_LASTING_ARRIVAL_S, _MEASURED_FRAMES * dt_s)
     much = arrived >= MUCH_ARRIVED_CELLS and arrived >= MUCH_ARRIVED_SHARE * cells
-    return Arrival(some, lasting, much)
+    return Arrival(some=some, lasting=lasting, much=much)
 
 
 @inlined

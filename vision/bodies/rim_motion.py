@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,8 +42,7 @@ _FLOOR_SIGMA_MPS = 0.03  # added sigma: error of the camera's own motion, as in 
 _UNKNOWN_MPS = 100.0  # sigma in the directions that a rim does not measure
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class RimVelocities:
+class RimVelocities(NamedTuple):
     """Velocities of T tracks by their free rims, in the fixed frame.
 
     mps: component along direction, (T,).
@@ -90,29 +90,32 @@ class RimMemory:
         Call clear first where pose cannot be compared with those before.
         """
         now = _View(now_ns, tracks.ids, free_rims(grid, labels, len(tracks)), pose)
-        old, recent = self._looked_back_at(now)
-        found = _measured(
-            grid,
-            now.rims,
-            pose,
-            old.rims,
-            old.pose,
-            tracks.index_of(old.track_id),
-            (now_ns - old.stamp_ns) * 1e-9,
-            recent.rims,
-            recent.pose,
-            tracks.index_of(recent.track_id),
-            (now_ns - recent.stamp_ns) * 1e-9,
-            self._fastest_mps,
-        )
+        self._views = [view for view in self._views if now_ns - view.stamp_ns <= _LOOK_BACK_NS]
+        compared = [view for view in self._views if now_ns - view.stamp_ns >= _SHORTEST_NS]
         self._views.append(now)
-        return RimVelocities(*found)
+        if not compared:
+            return _nothing_measured(len(tracks))
+        # The oldest view, and the latest one for younger tracks.
+        return _without_jumps(
+            self._since(compared[0], now, grid, tracks), self._since(compared[-1], now, grid, tracks)
+        )
 
-    def _looked_back_at(self, now: _View) -> tuple[_View, _View]:
-        """The oldest view that is compared, and the one for younger tracks; now where there is none."""
-        self._views = [v for v in self._views if now.stamp_ns - v.stamp_ns <= _LOOK_BACK_NS]
-        old = [v for v in self._views if now.stamp_ns - v.stamp_ns >= _SHORTEST_NS]
-        return (old[0], old[-1]) if old else (now, now)
+    def _since(self, then: _View, now: _View, grid: DepthGrid, tracks: Tracks) -> RimVelocities:
+        """Measure the tracks by comparing two views."""
+        lag_s = (now.stamp_ns - then.stamp_ns) * 1e-9
+        track = tracks.index_of(then.track_id)
+        return _measured(grid, now.rims, now.pose, then.rims, then.pose, track, lag_s, self._fastest_mps)
+
+
+@compiled("int64")
+def _nothing_measured(count: int) -> RimVelocities:
+    """RimVelocities of count tracks, none of which is measured."""
+    return RimVelocities(
+        mps=np.zeros(count),
+        sigma_mps=np.full(count, np.inf),
+        direction=np.zeros((count, 3)),
+        lag_s=np.zeros(count),
+    )
 
 
 @inlined
@@ -155,8 +158,8 @@ def _add_shifts(
         sums[2] += depth_m
 
 
-@inlined
-def _measure(
+@compiled(DepthGrid, FreeRims, Pose, FreeRims, Pose, "int64[::1], float64, float64")
+def _measured(
     grid: DepthGrid,
     now: FreeRims,
     pose: Pose,
@@ -165,13 +168,12 @@ def _measure(
     track: Integers,
     lag_s: float,
     fastest_mps: float,
-    into: tuple[FloatArray, FloatArray, FloatArray, FloatArray],
-) -> None:
-    """Measure the tracks by comparing now with then, lag_s ago.
+) -> RimVelocities:
+    """The velocities of the tracks by their rims now and then, lag_s ago.
 
-    track: present index of each track of then, -1 if it has ended. into: the fields of RimVelocities.
+    track: present index of each track of then, -1 if it has ended.
     """
-    mps, sigma_mps, direction, lags_s = into
+    result = _nothing_measured(len(now.column))
     rows = relative_row(pose, old_pose, 0), relative_row(pose, old_pose, 1), relative_row(pose, old_pose, 2)
     shift_m, step, sums = np.empty(2 * now.column.shape[2]), grid.x[1] - grid.x[0], np.empty(3)
     for k in range(len(track)):
@@ -192,59 +194,36 @@ def _measure(
         spread_m = _MEDIAN * np.median(np.abs(shift_m[:found] - middle_m))
         variance = 2.0 * (_QUANTUM * step * depth_m) ** 2 + spread_m * spread_m * _ROWS_ALIKE / found
         across = 1.0 / math.sqrt(1.0 + x * x)
-        mps[t], sigma_mps[t] = across * middle_m / lag_s, across * math.sqrt(variance) / lag_s
+        result.mps[t] = across * middle_m / lag_s
+        result.sigma_mps[t] = across * math.sqrt(variance) / lag_s
         for i in range(3):
-            direction[t, i] = across * (pose.rotation[i, 0] - x * pose.rotation[i, 2])
-        lags_s[t] = lag_s
+            result.direction[t, i] = across * (pose.rotation[i, 0] - x * pose.rotation[i, 2])
+        result.lag_s[t] = lag_s
+    return result
 
 
-@compiled(
-    DepthGrid,
-    FreeRims,
-    Pose,
-    FreeRims,
-    Pose,
-    "int64[::1], float64",
-    FreeRims,
-    Pose,
-    "int64[::1], float64, float64",
-)
-def _measured(
-    grid: DepthGrid,
-    now: FreeRims,
-    pose: Pose,
-    old: FreeRims,
-    old_pose: Pose,
-    old_track: Integers,
-    old_lag_s: float,
-    recent: FreeRims,
-    recent_pose: Pose,
-    recent_track: Integers,
-    recent_lag_s: float,
-    fastest_mps: float,
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """The fields of RimVelocities.
+@compiled(RimVelocities, RimVelocities)
+def _without_jumps(long: RimVelocities, short: RimVelocities) -> RimVelocities:
+    """The velocities over the long time; those over the short time where the track is too young for that.
 
-    They are compared with the old view, or with the recent one if the track is too young. What has moved has
-    moved as fast since both. A rim that jumped once, as cells of something else joined the body, has not:
-    nothing is measured for as long as the jump lies between the views.
+    What has moved has moved as fast over both. A rim that jumped once, as cells of something else joined the
+    body, has not: nothing is measured for as long as the jump lies between the views.
     """
-    count = len(now.column)
-    result = np.zeros(count), np.full(count, np.inf), np.zeros((count, 3)), np.zeros(count)
-    if old_lag_s <= 0.0:
-        return result
-    before = np.zeros(count), np.full(count, np.inf), np.zeros((count, 3)), np.zeros(count)
-    _measure(grid, now, pose, recent, recent_pose, recent_track, recent_lag_s, fastest_mps, result)
-    _measure(grid, now, pose, old, old_pose, old_track, old_lag_s, fastest_mps, before)
-    for t in range(count):
-        if not (result[1][t] < np.inf and before[1][t] < np.inf):
+    result = RimVelocities(
+        mps=short.mps.copy(),
+        sigma_mps=short.sigma_mps.copy(),
+        direction=short.direction.copy(),
+        lag_s=short.lag_s.copy(),
+    )
+    for t in range(len(result.mps)):
+        if not (short.sigma_mps[t] < np.inf and long.sigma_mps[t] < np.inf):
             continue
-        apart_mps = abs(before[0][t] - result[0][t])
-        if apart_mps > _ALIKE_SIGMAS * math.hypot(before[1][t], result[1][t]):
-            result[0][t], result[1][t] = 0.0, np.inf
-            continue
-        result[0][t], result[1][t] = before[0][t], before[1][t]
-        result[2][t], result[3][t] = before[2][t], before[3][t]
+        apart_mps = abs(long.mps[t] - short.mps[t])
+        if apart_mps > _ALIKE_SIGMAS * math.hypot(long.sigma_mps[t], short.sigma_mps[t]):
+            result.mps[t], result.sigma_mps[t] = 0.0, np.inf
+        else:
+            result.mps[t], result.sigma_mps[t] = long.mps[t], long.sigma_mps[t]
+            result.direction[t], result.lag_s[t] = long.direction[t], long.lag_s[t]
     return result
 
 

@@ -62,6 +62,7 @@ class Tracks:
     nearly_hidden: Flags = _column(np.bool_)  # a mover of which only a small rest was visible
     # A mover without an edge in depth to the static surface beside it: where it ends there is a guess.
     border_is_guess: Flags = _column(np.bool_)
+    merged_away: Flags = _column(np.bool_)  # joined to another track, so it ends with this frame
     overhead: Flags = _column(np.bool_)  # seen only above the robot's height; the rest is out of sight
     # The verdict (vision/bodies/judgement.py).
     evidence: Vector = _column(float)  # the score it rests on
@@ -115,11 +116,16 @@ class Tracks:
         return indices_of(self.ids, ids)
 
     def start(
-        self, position_m: FloatArray, sigma_m: float, max_speed_mps: float, evidence: float, now_ns: int
+        self,
+        position_m: FloatArray,
+        sigma_m: float,
+        max_speed_mps: float,
+        evidence: FloatArray | float,
+        now_ns: int,
     ) -> None:
         """Begin tracks at positions (K, 3), known to sigma_m, with unknown velocity.
 
-        Its mean is 0 and its standard deviation is max_speed_mps.
+        Its mean is 0 and its standard deviation is max_speed_mps. evidence: score of each, (K,), or of all.
         """
         count = len(position_m)
         given: dict[str, object] = {

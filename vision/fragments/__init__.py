@@ -11,5 +11,5 @@ Files, in the order in which they come into play within one frame:
 * segments - line segments from edges, with their ends moved to corners.
 * candidates - segments become new fragments: trackable ends, depth on one surface.
 * corners - pairs of corners, for bodies without straight edges.
-* attention - bodies with too few fragments are searched by themselves.
+* attention - bodies with too few fragments (vision/bodies/few_fragments.py) are searched by themselves.
 """

@@ -1,8 +1,8 @@
 """A closer look at bodies with too few fragments to measure their motion.
 
 The fragments are spread over the whole image, long ones first, so a small, plain or partly hidden body gets
-none. bodies_needing_fragments lists such bodies at the end of tracking. In the next frame Attention searches
-the image box of one of them, for shorter segments as well. The fragments that it finds are body-only: they
+none. The tracker lists such bodies (vision/bodies/few_fragments.py). In the next frame Attention searches the
+image box of one of them, for shorter segments as well. The fragments that it finds are body-only: they
 measure the motion of that body only. The camera's motion is not estimated from them, since the body may move.
 """
 
@@ -13,14 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from config.perception import DepthNoise, PerceptionConfig
-from hal.compiled import compiled
-from hal.types import FloatArray, Pose, RgbdFrame
-from vision.bodies.births import MIN_CELLS
-from vision.bodies.tracks import Tracks
+from config.perception import PerceptionConfig
+from hal.types import FloatArray, RgbdFrame
 from vision.depth.depth_mask import surface_depth
-from vision.depth.depth_noise import depth_sigma_of
-from vision.detection import Detection
 from vision.fragments.candidates import (
     NewFragments,
     depth_along,
@@ -33,10 +28,6 @@ from vision.fragments.corners import corners_within, in_pairs
 from vision.fragments.edges import GreyImage, find_edges
 from vision.fragments.segments import SNAP_PX, find_segments, longest_first
 
-_FEW_FRAGMENTS = 4  # fewer are too few: a verdict along the line of sight takes 8 ends (bodies/proof.py)
-_ENOUGH_OF_A_MOVER = 2  # enough to follow a mover, together with its surface
-_REACH_M = 9.0  # maximum distance: the depth mask's 10 m less about the noise of depth there
-_URGENT_SIGHTINGS = 45  # bodies seen in fewer frames, and suspects, are urgent
 # Minimum time between two looks at an urgent body. It is just below a whole number of frame intervals at 30,
 # 15 or 10 Hz, so that the rounding of a stamp does not decide.
 _URGENT_NS = 95_000_000
@@ -57,11 +48,6 @@ _MAX_CORNER_AREA_PX = (
     40_000  # of the image around a body: larger ones are near, and their surface is known well
 )
 _AT_ONCE = 4  # maximum per look: takes a body from none to enough, and leaves room for other bodies
-# Gate on depth around the centre of the body: the sum of the depth of a body, of two sigmas of noise (95 %),
-# and of half of its measured extent in depth, which counts up to 1 m: more is noise or a wall.
-_GATE_M = 0.3
-_GATE_SIGMAS = 2.0
-_DEEPEST_M = 1.0
 _ONE_SURFACE = 0.5  # maximum distance of near and far surface at an end, as a share of the gate
 _HOLES = 0.2  # of the 25 samples around an end: from 0.25 on there may be another surface (depth_mask.py)
 
@@ -82,42 +68,6 @@ class NeedsFragments:
     depth_m: FloatArray
     gate_m: FloatArray
     urgent: NDArray[np.bool_]
-
-
-def bodies_needing_fragments(
-    tracks: Tracks, detection: Detection, config: PerceptionConfig
-) -> NeedsFragments:
-    """The tracks seen in this frame that have too few fragments."""
-    chosen, depth_m, gate_m, urgent = _needing_fragments(
-        tracks, detection.captured_ns, detection.pose, config.depth_noise
-    )
-    return NeedsFragments(tracks.ids[chosen], tracks.bbox_px[chosen], depth_m, gate_m, urgent)
-
-
-@compiled(Tracks, "int64", Pose, DepthNoise)
-def _needing_fragments(
-    tracks: Tracks, now_ns: int, camera: Pose, noise: DepthNoise
-) -> tuple[NDArray[np.intp], FloatArray, FloatArray, NDArray[np.bool_]]:
-    """Indices of the tracks that need fragments, and their depth_m, gate_m and urgent."""
-    size = len(tracks.state)
-    chosen, depth_m, gate_m = np.empty(size, np.intp), np.empty(size), np.empty(size)
-    urgent, count = np.empty(size, np.bool_), 0
-    for n in range(size):
-        few = tracks.fragments[n] < (_ENOUGH_OF_A_MOVER if tracks.moving[n] else _FEW_FRAGMENTS)
-        if not few or tracks.seen_ns[n] != now_ns or tracks.cells[n] < MIN_CELLS:
-            continue
-        x = tracks.state[n, 0] - camera.translation_m[0]
-        y = tracks.state[n, 1] - camera.translation_m[1]
-        z = tracks.state[n, 2] - camera.translation_m[2]
-        if not x * x + y * y + z * z <= _REACH_M**2:
-            continue
-        depth = max(x * camera.rotation[0, 2] + y * camera.rotation[1, 2] + z * camera.rotation[2, 2], 0.0)
-        gate = _GATE_M + _GATE_SIGMAS * depth_sigma_of(depth, noise.floor_m, noise.quadratic_per_m)
-        gate += 0.5 * np.minimum(tracks.extent_m[n, 2], _DEEPEST_M)
-        chosen[count], depth_m[count], gate_m[count] = n, depth, gate
-        urgent[count] = tracks.evidence[n] > 0.0 or tracks.sightings[n] < _URGENT_SIGHTINGS
-        count += 1
-    return chosen[:count], depth_m[:count], gate_m[:count], urgent[:count]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

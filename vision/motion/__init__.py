@@ -12,6 +12,5 @@ In track (vision/tracker.py):
 * least_squares - velocities of fragments and of bodies from these equations.
 * candidates - which fragments move, which are static, and which move alike.
 * limbs - when to believe fragments of a body that disagree.
-* motion_evidence - all evidence of one frame, for the verdict.
 * line_of_sight - velocities along and across the line of sight, in their own sigmas.
 """

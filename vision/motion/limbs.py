@@ -7,7 +7,7 @@ Therefore:
 * variance: how far the velocity of the fragments may be from that of the body. It is large for one or two
   fragments of a mover, however precise they are, and where many fragments disagree, since some are on limbs.
 * in_fixed_frame: the velocities as measurements for the filters of the tracks.
-* restless: of 6 ends or more, 70 % contradict that the body is static, whether they agree with each other or
+* restless: most of several ends contradict that the body is static, whether they agree with each other or
   not. A walking person is restless most of the time.
 """
 

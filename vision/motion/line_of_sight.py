@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hal.compiled import compiled, inlined
-from hal.types import Flags, FloatArray
+from hal.types import Flags, FloatArray, Matrices, Matrix
 
 _FLOOR_SIGMA_MPS = 0.03  # added sigma: error of the camera's own motion, which no filter models
 _CONTRADICTION_SIGMAS = 2.5  # 99 % of equal velocities differ by less
@@ -26,40 +26,28 @@ _NOWHERE = np.zeros(3)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Split:
-    """Velocities of T bodies, split along and across the line of sight.
+    """K velocities of each of T bodies, split along and across the line of sight.
 
-    value, variance: the component along it, (..., T).
-    rest: the remainder, across it, (..., T, 3).
+    value, variance: the component along it, (K, T).
+    rest: the remainder, across it, (K, T, 3).
     along, across, total: squared Mahalanobis distance from zero of the component along, of the remainder, and
-        of the whole velocity, (..., T).
-    level: the same of the level component across, (..., T); equal to across where the floor is not known.
+        of the whole velocity, (K, T).
+    level: the same of the level component across, (K, T); equal to across where the floor is not known.
     """
 
-    value: FloatArray
-    variance: FloatArray
-    rest: FloatArray
-    along: FloatArray
-    across: FloatArray
-    total: FloatArray
-    level: FloatArray
-
-    def __getitem__(self, k: int) -> Split:
-        """Entry k of the first axis."""
-        return Split(
-            value=self.value[k],
-            variance=self.variance[k],
-            rest=self.rest[k],
-            along=self.along[k],
-            across=self.across[k],
-            total=self.total[k],
-            level=self.level[k],
-        )
+    value: Matrix
+    variance: Matrix
+    rest: Matrices
+    along: Matrix
+    across: Matrix
+    total: Matrix
+    level: Matrix
 
 
 def decompose(
     velocity: FloatArray, covariance: FloatArray, sight: FloatArray, up: FloatArray | None
 ) -> Split:
-    """Split velocity (..., T, 3) with covariance (..., T, 3, 3).
+    """Split velocity (K, T, 3) with covariance (K, T, 3, 3).
 
     sight (T, 3): unit vectors along the lines of sight. up (3,): the floor's normal, None if not known.
     """
@@ -180,15 +168,15 @@ class SecondOpinion:
     confirms_across: Flags
 
 
-def second_opinion(fragments: Split, surface: Split, apart: Split) -> SecondOpinion:
-    """Compare velocities of T bodies by their fragments and by their surfaces; apart: the difference."""
+def second_opinion(parts: Split, fragments: int, surface: int, apart: int) -> SecondOpinion:
+    """Compare two of the K velocities: fragments and surface. apart is their difference."""
     denied, least = _CONTRADICTION_SIGMAS**2, CONFIRMING_SIGMAS**2
-    denies_along = np.square(apart.value) > denied * apart.variance
-    same_way = surface.value * fragments.value > 0
-    same_side = (fragments.rest * surface.rest).sum(axis=1) > 0
+    denies_along = np.square(parts.value[apart]) > denied * parts.variance[apart]
+    same_way = parts.value[surface] * parts.value[fragments] > 0
+    same_side = (parts.rest[fragments] * parts.rest[surface]).sum(axis=1) > 0
     return SecondOpinion(
-        denies_along,
-        apart.across > denied,
-        (surface.along > least) & same_way & ~denies_along,
-        (surface.across > least) & same_side,
+        denies_along=denies_along,
+        denies_across=parts.across[apart] > denied,
+        confirms_along=(parts.along[surface] > least) & same_way & ~denies_along,
+        confirms_across=(parts.across[surface] > least) & same_side,
     )

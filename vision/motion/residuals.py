@@ -5,7 +5,7 @@ residual (innovation) is how far from there it is seen, with its covariance and 
 ends that are not known to move also give the scale of the noise (observed_variance_scale).
 
 vision/detector.py calls this after the camera's motion has been estimated. The evidence of tracks, which
-rests on these residuals among other things, is in vision/motion/motion_evidence.py.
+rests on these residuals among other things, is in vision/bodies/motion_evidence.py.
 """
 
 from __future__ import annotations

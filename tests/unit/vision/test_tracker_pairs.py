@@ -31,6 +31,22 @@ def test_a_pair_that_would_be_divided_again_is_not_merged() -> None:
     assert set(ids) == {ids[0]}  # the same two throughout: neither merged nor born again
 
 
+def test_a_track_that_is_merged_into_another_one_ends_at_once() -> None:
+    """A walker's bag, 0.1 m beside him, is a track of its own until both are seen to move."""
+    views = []
+    for k in range(8):
+        x_m = -1.1 + k * PACE_M
+        views.append(
+            nearest(
+                plate(3.0, (x_m, x_m + 0.4), (-0.9, 1.0)), plate(3.0, (x_m + 0.5, x_m + 0.65), (-0.3, 0.5))
+            )
+        )
+    seen = [percept.scene.obstacles for percept in track(views)]
+    assert [len(obstacles) for obstacles in seen[3:]] == [2, 2, 1, 1, 1]
+    assert seen[5][0].moving
+    assert seen[5][0].extent_m[0] > 0.55  # with the bag
+
+
 def tracks_of_a_pair(static_chi2: float) -> int:
     """Number of obstacles that are seen of two people, shoulder before shoulder, with four fragments."""
     tracker = Tracker(PerceptionConfig(), body_height_m=1.5, clearance_m=0.05)

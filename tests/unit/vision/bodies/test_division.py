@@ -45,6 +45,19 @@ def test_two_people_hand_in_hand_are_divided_between_them() -> None:
     assert 2 * len(second) <= np.count_nonzero(labels) + 1  # the smaller one
 
 
+def test_only_the_tracks_asked_that_hold_two_bodies_are_divided() -> None:
+    grid, labels = two_people(0.4)
+    pair, child = labels, np.where(X > 0.0, labels, 0).astype(np.int32)
+    none, far_m = nothing(labels), np.ones(2)
+    (found,) = division.second_bodies(grid, pair, np.array([0, 1]), none, far_m)
+    second = second_of(grid, labels, 0)
+    assert second is not None
+    assert found[0] == 0
+    assert np.array_equal(found[1], second)
+    assert division.second_bodies(grid, pair, np.array([1]), none, far_m) == []
+    assert division.second_bodies(grid, child, np.array([0]), none, far_m) == []
+
+
 @pytest.mark.parametrize(("share", "divided"), [(0.3, True), (0.42, False)])
 def test_a_valley_is_lower_than_a_third_of_both_sides(share: float, divided: bool) -> None:
     left, right = plate(3.0, (-0.7, -0.25), (-0.7, 0.9)), plate(3.0, (0.25, 0.7), (-0.7, 0.9))

@@ -27,7 +27,7 @@ from tests.support.judging import (
     verdict,
 )
 from vision.bodies.judgement import judge
-from vision.motion.motion_evidence import MotionEvidence
+from vision.bodies.motion_evidence import MotionEvidence
 
 
 def test_frame_without_evidence_proves_nothing() -> None:

@@ -21,7 +21,7 @@ from tests.support.judging import (
     verdict,
 )
 from vision.bodies.judgement import Verdict, judge
-from vision.motion.motion_evidence import MotionEvidence
+from vision.bodies.motion_evidence import MotionEvidence
 
 
 def rise_s(seen: MotionEvidence) -> float:

@@ -9,7 +9,7 @@ import pytest
 
 from tests.support.detections import detection
 from tests.support.grids import grid_of, wall
-from vision.motion.motion_evidence import borne_out
+from vision.bodies.motion_evidence import borne_out
 
 
 @pytest.mark.parametrize(
