@@ -120,7 +120,7 @@ def test_limits_of_the_model_hold_on_the_wire() -> None:
         (state(vehicle=1), "emergency stop is pressed"),
         (state(vehicle=2, faults=0x0104), "exception (vehicle state 2: system fault: unknown bit 0x0004"),
         (state(vehicle=77), "exception (vehicle state 77: no fault named)"),
-        (state(mode=REMOTE), "remote control has taken over"),
+        (state(mode=REMOTE), "remote control has taken over: switch it to command mode (SWB up), or off"),
         (state(mode=SERIAL), "serial has taken over"),
         (state(mode=STANDBY), "no longer obeys: control mode is standby"),
         (state(mode=9), "no longer obeys: control mode is unknown mode 9"),
