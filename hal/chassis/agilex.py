@@ -46,8 +46,9 @@ _UNUSED_IDS = frozenset(range(_FIRST_ACTUATOR, _FIRST_ACTUATOR + ACTUATORS))
 # Period of 0x421 while the base has not followed it.
 _MODE_RETRY_NS = 40 * NS_PER_MS
 
-# Motion is held back once this many frames were sent since the base was last heard. A base that works sends
-# several frames each 20 ms. SocketCAN queues 10 frames (txqueuelen): there is room for a zero behind these.
+# Once this many frames were sent since the base was last heard, motion is held back. So is the mode that some
+# models need again and again while armed. A base that works sends several frames each 20 ms. SocketCAN queues
+# 10 frames (txqueuelen), so there is room for a zero behind these.
 _MAX_UNHEARD = 2
 
 
@@ -132,7 +133,7 @@ class AgilexChassis(ChassisDriver):
         if self._other_master_drives:
             return None
         motion_due = due(self._motion_sent_ns, self._period_ns, now_ns) or (self._moving and is_zero(command))
-        motion_due = motion_due and (is_zero(command) or self._sent_unheard < _MAX_UNHEARD)
+        motion_due = motion_due and (is_zero(command) or self._heard_lately)
         if motion_due:
             self._send_motion(command, now_ns)
         mode = self._mode_to_send(now_ns)
@@ -161,6 +162,10 @@ class AgilexChassis(ChassisDriver):
         """Whether somebody else commands a base that this driver never asked to obey."""
         return not self._arming_begun and self._other_master is not None and self._other_master.sentence != ""
 
+    @property
+    def _heard_lately(self) -> bool:
+        return self._sent_unheard < _MAX_UNHEARD
+
     def _mode_to_send(self, now_ns: int) -> int | None:
         """The mode of the 0x421 that is due, or None.
 
@@ -170,9 +175,8 @@ class AgilexChassis(ChassisDriver):
         mode = self._arming.mode
         if mode is ChassisMode.ARMED:
             period_ms = self._model.mode_period_ms
-            if period_ms is not None and due(self._mode_sent_ns, period_ms * NS_PER_MS, now_ns):
-                return self._command_mode
-            return None
+            repeated = period_ms is not None and due(self._mode_sent_ns, period_ms * NS_PER_MS, now_ns)
+            return self._command_mode if repeated and self._heard_lately else None
         if not due(self._mode_sent_ns, _MODE_RETRY_NS, now_ns):
             return None
         if mode is ChassisMode.ARMING:

@@ -11,6 +11,7 @@ from config.chassis import CanLinkConfig
 from config.plant import PlantConfig
 from hal.chassis.agilex import AgilexChassis
 from hal.chassis.agilex_messages import ActuatorSlow, MotionCommand, MotionFeedback
+from hal.chassis.agilex_models import model_of
 from hal.links.can_bus import CanBusLink
 from hal.links.scripted import ScriptedCanLink
 from hal.types import CanFrame, ChassisMode, ChassisState, Setpoint
@@ -31,6 +32,7 @@ class Kernel:
     def __init__(self, queue_length: int) -> None:
         self.base = ScriptedCanLink()
         self.queue: deque[can.Message] = deque()
+        self._arrived: deque[CanFrame] = deque()
         self.opened = 0
         self._queue_length = queue_length
         self._cable_out = False
@@ -44,20 +46,27 @@ class Kernel:
             raise can.CanOperationError("Transmit buffer full")
 
     def received(self) -> can.Message | None:
-        if self._cable_out:
-            self.base.sent.clear()
-        if not self.base.sent:
+        self._take_from_base()
+        if not self._arrived:
             return None
-        frame = self.base.sent.pop(0)
+        frame = self._arrived.popleft()
         return can.Message(arbitration_id=frame.arbitration_id, data=frame.data, is_extended_id=False)
 
+    def _take_from_base(self) -> None:
+        if not self._cable_out:
+            self._arrived.extend(self.base.sent)
+        self.base.sent.clear()
+
     def pull_cable(self) -> None:
+        """What the base has sent until now is still received."""
+        self._take_from_base()
         self._cable_out = True
 
     def connect_cable(self) -> None:
         self._cable_out = False
         while self.queue:
             self.transmit(self.queue.popleft())
+        self.base.sent.clear()
 
 
 class Socket(can.BusABC):
@@ -76,12 +85,13 @@ class Socket(can.BusABC):
 
 
 class Drive:
-    """Driver, SocketCAN and an emulated BUNKER, each 20 ms."""
+    """Driver, SocketCAN and an emulated base, each 20 ms."""
 
     def __init__(self, kernel: Kernel, **changes: object) -> None:
         config = agilex_config(None, **changes)
         link = CanBusLink(CanLinkConfig(interface="socketcan", channel="can0"))
-        self.emulator = AgilexEmulator(kernel.base, TrackedPlant(PlantConfig(slip_factor=1.0)))
+        plant = TrackedPlant(PlantConfig(slip_factor=1.0))
+        self.emulator = AgilexEmulator(kernel.base, plant, model=model_of(config))
         self.chassis = AgilexChassis(link, config)
         self.now_ns = 0
 
@@ -96,26 +106,37 @@ class Drive:
         return state
 
 
+@pytest.mark.parametrize("model", ["bunker", "bunker_mini"])
 @pytest.mark.parametrize("queue_length", [3, 10, 1000])
 @pytest.mark.parametrize("feedback_timeout_ms", [200, 600])
 @pytest.mark.parametrize("first_mps", [0.0, 0.5])
 def test_nothing_moves_when_the_cable_is_plugged_in_again(
-    monkeypatch: pytest.MonkeyPatch, queue_length: int, feedback_timeout_ms: int, first_mps: float
+    monkeypatch: pytest.MonkeyPatch,
+    model: str,
+    queue_length: int,
+    feedback_timeout_ms: int,
+    first_mps: float,
 ) -> None:
-    """first_mps: commanded until 180 ms after the cable came out; then the command is 0.5 m/s."""
+    """A BUNKER MINI is sent its mode again and again, too.
+
+    first_mps: commanded until 180 ms after the cable came out; then the command is 0.5 m/s.
+    """
     kernel = Kernel(queue_length)
     monkeypatch.setattr(can, "Bus", lambda **options: Socket(kernel))
-    drive = Drive(kernel, feedback_timeout_ms=feedback_timeout_ms)
+    drive = Drive(kernel, model=model, feedback_timeout_ms=feedback_timeout_ms)
     with drive.emulator, drive.chassis:
         drive.steps(20, 0.0)
         drive.chassis.arm(drive.now_ns)
         drive.steps(20, 0.0)
         assert drive.steps(100, first_mps).mode is ChassisMode.ARMED
+        drive.emulator.advance_to(drive.now_ns + 20 * MS)
         kernel.pull_cable()
         drive.steps(9, first_mps)
         assert drive.steps(250, 0.5).mode is ChassisMode.LOST
         commands = [bytes(one.data) for one in kernel.queue if one.arbitration_id == 0x111]
-        assert sum(data != ZERO for data in commands) <= 2
+        moving = sum(data != ZERO for data in commands)
+        assert moving <= 2
+        assert (moving > 0) == (first_mps > 0.0), "motion is sent once more, and waits"
         assert commands[-1] == ZERO
         stood_m = drive.emulator.plant.track_travel_m
         kernel.connect_cable()
