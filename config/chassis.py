@@ -109,15 +109,17 @@ AgilexLinkConfig = Annotated[
 ]
 
 
-class _Battery(Section):
-    """What all bases have in common."""
+class AnyBaseConfig(Section):
+    """What all bases have in common. An older setpoint than command_timeout_ms latches the robot."""
 
+    command_timeout_ms: int = Field(default=100, ge=40, le=1000, description="older setpoints stop the robot")
+    arming_timeout_ms: int = Field(default=3000, ge=200, le=60_000)
     battery_low_v: float | None = Field(
         default=None, gt=0, le=200, description="told where the battery stays below it for 3 s; null: never"
     )
 
 
-class AgilexChassisConfig(_Battery):
+class AgilexChassisConfig(AnyBaseConfig):
     """An AgileX base that speaks protocol V2, over CAN or, where it has that, over RS-232.
 
     link: ``{interface: socketcan, channel: can0}``, or ``{url: /dev/ttyUSB0}`` for RS-232.
@@ -133,10 +135,8 @@ class AgilexChassisConfig(_Battery):
     model: AgilexModelName = "bunker"
     link: AgilexLinkConfig
     command_period_ms: int = Field(default=20, ge=5, le=100)
-    command_timeout_ms: int = Field(default=200, ge=40, le=1000, description="older setpoints stop the robot")
     feedback_timeout_ms: int = Field(default=200, ge=40, le=2000, description="of motion feedback 0x221")
     status_timeout_ms: int = Field(default=700, ge=100, le=5000, description="of system state 0x211")
-    arming_timeout_ms: int = Field(default=3000, ge=200, le=60_000)
     track_width_m: float | None = Field(default=None, gt=0.05, le=5)
     slip_factor: float = Field(default=1.0, ge=1.0, le=3.0)
     actuators: int | None = Field(default=None, ge=1, le=8)
@@ -164,7 +164,7 @@ class AgilexChassisConfig(_Battery):
         return self
 
 
-class _TwoChannelConfig(_Battery):
+class _TwoChannelConfig(AnyBaseConfig):
     """What bases with one two-channel motor controller have in common: channel 1 left, channel 2 right.
 
     counts_per_m: encoder counts for one metre of track. slip_factor: as for AgileX.
@@ -176,10 +176,8 @@ class _TwoChannelConfig(_Battery):
     slip_factor: float = Field(default=1.0, ge=1.0, le=3.0)
     invert_left: bool = False
     invert_right: bool = False
-    command_timeout_ms: int = Field(default=200, ge=40, le=1000)
     feedback_timeout_ms: int = Field(default=300, ge=100, le=2000)
     status_timeout_ms: int = Field(default=1000, ge=200, le=5000)
-    arming_timeout_ms: int = Field(default=3000, ge=200, le=60_000)
 
     @property
     def left_sign(self) -> int:
@@ -252,7 +250,7 @@ KOBUKI_TOP_SPEED_MPS = 0.7
 KOBUKI_WHEEL_BASE_M = 0.23
 
 
-class KobukiChassisConfig(_Battery):
+class KobukiChassisConfig(AnyBaseConfig):
     """A Kobuki, the base of Turtlebot 2. Its geometry is fixed: the base itself turns a twist into speeds.
 
     max_speed_mps, max_yaw_rate_radps: of the base; a bend in which a wheel would be faster than it makes,
@@ -268,9 +266,7 @@ class KobukiChassisConfig(_Battery):
     max_yaw_rate_radps: float = Field(default=1.9, gt=0, le=3.1, description="faster, and the gyro is off")
     base_timeout_ms: int = Field(default=600, ge=100, le=5000)
     command_period_ms: int = Field(default=20, ge=10, le=100)
-    command_timeout_ms: int = Field(default=200, ge=40, le=1000)
     feedback_timeout_ms: int = Field(default=200, ge=60, le=2000, description="of its stream, 50 a second")
-    arming_timeout_ms: int = Field(default=3000, ge=200, le=60_000)
     battery_low_v: float | None = Field(default=14.0, gt=0, le=200, description="as the vendor's driver")
 
     @property

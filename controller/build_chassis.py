@@ -58,7 +58,8 @@ def build_base_in_memory(
 
 
 def _guarded(config: AppConfig, driver: Chassis) -> Chassis:
-    return GuardedChassis(driver, GuardLimits.of(config.robot.limits, 1.0 / config.runner.control_rate_hz))
+    period_s, max_age_s = 1.0 / config.runner.control_rate_hz, 1e-3 * config.chassis.command_timeout_ms
+    return GuardedChassis(driver, GuardLimits.of(config.robot.limits, period_s, max_age_s))
 
 
 def _bare_base(config: AppConfig, start: PlanarPose, start_ns: int) -> tuple[Chassis, Emulator | None]:

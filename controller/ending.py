@@ -14,7 +14,8 @@ from hal.types import LATCHED_MODES, ChassisMode, ChassisState, Setpoint
 
 # The robot has come to rest once it has been commanded to stand, and measured to stand, for this long.
 SETTLE_S = 0.5
-# A base that has not armed after this time will not; the drive ends instead of waiting for ever.
+# A base that is not even arming after this time will not arm: the drive ends instead of waiting for ever. How
+# long arming itself may take is up to the driver, which then gives up (chassis.arming_timeout_ms).
 ARM_TIMEOUT_S = 5.0
 # A base that lags by 2 s has come to rest this long after the last command that moved it.
 REST_TIMEOUT_S = 6.0
@@ -77,7 +78,7 @@ class Ending:
         elif self._was_armed or state.mode in LATCHED_MODES:
             self._end(Outcome.CHASSIS_FAULT, state.reason, now_ns)
             return
-        elif now_ns - self._started_ns > ARM_TIMEOUT_S * NS_PER_S:
+        elif state.mode is not ChassisMode.ARMING and now_ns - self._started_ns > ARM_TIMEOUT_S * NS_PER_S:
             self._end(Outcome.NOT_ARMED, state.reason, now_ns)
             return
         told_to_stand = setpoint.v_mps == 0.0 and setpoint.a_mps2 == 0.0 and setpoint.w_radps == 0.0

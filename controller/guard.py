@@ -23,13 +23,14 @@ from hal.types import LATCHED_MODES, CanFrame, ChassisMode, ChassisState, Setpoi
 
 _TOLERANCE = 1e-6
 
-# A setpoint is sent in the step that made it; older ones come from a program that hangs somewhere.
-_MAX_AGE_S = 0.1
-
 
 @dataclass(frozen=True, slots=True)
 class GuardLimits:
-    """The bounds. period_s: of the control loop; two steps closer in time are one late and one on time."""
+    """The bounds.
+
+    period_s: of the control loop; two steps closer in time are one late and one on time.
+    max_age_s: of a setpoint. It is sent in the step that made it; older ones come from a program that hangs.
+    """
 
     max_speed_mps: float
     max_yaw_rate_radps: float
@@ -37,10 +38,10 @@ class GuardLimits:
     max_decel_mps2: float
     max_jerk_mps3: float
     period_s: float
-    max_age_s: float = _MAX_AGE_S
+    max_age_s: float
 
     @classmethod
-    def of(cls, limits: Limits, period_s: float) -> Self:
+    def of(cls, limits: Limits, period_s: float, max_age_s: float) -> Self:
         """The bounds of every command: the robot's limits, with those of an emergency stop for braking."""
         return cls(
             max_speed_mps=limits.max_speed_mps,
@@ -49,6 +50,7 @@ class GuardLimits:
             max_decel_mps2=limits.emergency_decel_mps2,
             max_jerk_mps3=limits.emergency_jerk_mps3,
             period_s=period_s,
+            max_age_s=max_age_s,
         )
 
 

@@ -120,6 +120,7 @@ FAULTS = (
     Fault("base restarts", lambda rig: rig.emulator.restart()),
     Fault("base frozen", lambda rig: rig.emulator.freeze(), lambda rig: rig.emulator.thaw()),
     Fault("unplugged", lambda rig: rig.link.unplug(), lambda rig: rig.link.plug()),
+    Fault("cable out", lambda rig: rig.link.pull_cable(), lambda rig: rig.link.connect_cable()),
     Fault("nothing comes back", lambda rig: rig.link.cut_wire(), lambda rig: rig.link.restore_wire()),
     Fault("control hangs or is killed", during=lambda rig: rig.step_without_control()),
     Fault("command is no number", during=lambda rig: rig.step(math.nan)),

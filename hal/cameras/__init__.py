@@ -1,6 +1,6 @@
 """Cameras behind hal.api.FrameSource: a RealSense, folders of images (TUM format) and ROS bags.
 
-realsense.py - an Intel RealSense D435i
+realsense.py - an Intel RealSense D435i; realsense_sensors.py - the options of its sensors
 device_clock.py - maps the camera's clock to the monotonic clock
 recording.py - what every recording offers besides frames
 calibration.py - camera.yaml: intrinsics, scale, mount; rectifies raw images

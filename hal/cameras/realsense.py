@@ -15,6 +15,7 @@ import numpy as np
 from config.camera import RealsenseCameraConfig
 from hal.api import Clock
 from hal.cameras.device_clock import DeviceClock
+from hal.cameras.realsense_sensors import set_up_sensors
 from hal.clocks import NS_PER_MS, NS_PER_S
 from hal.errors import DeviceNotFound, DeviceRefused, FrameTimeout, LinkLost
 from hal.types import GyroSamples, Intrinsics, RgbdFrame
@@ -100,7 +101,7 @@ class RealsenseCamera:
         device = _find_device(rs, context, self._config.serial)
         serial = device.get_info(rs.camera_info.serial_number)
         self._name = f"{device.get_info(rs.camera_info.name)} {serial}"
-        _set_up_sensors(rs, device)
+        set_up_sensors(rs, device, self._name, self._config)
         profile = self._start_video(context, serial, stack)
         self._device = profile.get_device()
         colour = profile.get_stream(rs.stream.color).as_video_stream_profile()
@@ -262,16 +263,6 @@ def _find_device(rs: Any, context: Any, serial: str | None) -> Any:
     if serial not in devices:
         raise DeviceNotFound(f"RealSense: no camera with serial number {serial}; connected: {found}")
     return devices[serial]
-
-
-def _set_up_sensors(rs: Any, device: Any) -> None:
-    for sensor in device.query_sensors():
-        # Otherwise auto exposure would halve the rate of the colour images in dim light.
-        if sensor.supports(rs.option.auto_exposure_priority):
-            sensor.set_option(rs.option.auto_exposure_priority, 0)
-        # Global time follows the wall clock, which steps; the device's own clock does not.
-        if sensor.supports(rs.option.global_time_enabled):
-            sensor.set_option(rs.option.global_time_enabled, 0)
 
 
 def _stop(pipeline: Any) -> None:

@@ -2,7 +2,7 @@
 
 driver.py - what all drivers share: arming, a link that may be lost, checks of the command
 reading.py - reads all that has arrived on a serial link
-late_answer.py - the words for an answer that came too late
+outstanding.py - the one request whose answer is awaited, and how late it came; for RoboClaw and Roboteq
 command.py - checks and limits a setpoint before it is sent
 arming.py - the arming state machine
 following.py - checks that the base follows its commands
@@ -15,6 +15,6 @@ frame_age.py - how long a frame waited in buffers
 encoder_feedback.py - speeds and pose from two encoders, for RoboClaw and Roboteq
 agilex.py - AgileX driver; agilex_models.py, agilex_messages.py, agilex_serial.py, agilex_feedback.py
 roboclaw.py - RoboClaw driver; roboclaw_port.py, roboclaw_packets.py, roboclaw_feedback.py
-roboteq.py - Roboteq driver; roboteq_lines.py, roboteq_feedback.py
+roboteq.py - Roboteq driver; roboteq_port.py, roboteq_lines.py, roboteq_feedback.py
 kobuki.py - Kobuki driver; kobuki_packets.py, kobuki_feedback.py
 """

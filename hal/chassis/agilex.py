@@ -4,6 +4,9 @@ One motion command 0x111 is sent every command period: zero in every mode except
 out of standby while arming, and puts it back afterwards. Where somebody else commands the base over CAN, the
 driver does not arm, and latches if it is armed. Before it has begun to arm it then sends nothing at all,
 since a zero would stop a drive that is not its own.
+
+Frames that no node acknowledges wait in the adapter and in the kernel until the cable is plugged in again.
+So motion goes out only while the base is heard, and what waits behind it is zero.
 """
 
 from __future__ import annotations
@@ -42,6 +45,11 @@ _UNUSED_IDS = frozenset(range(_FIRST_ACTUATOR, _FIRST_ACTUATOR + ACTUATORS))
 
 # Period of 0x421 while the base has not followed it.
 _MODE_RETRY_NS = 40 * NS_PER_MS
+
+# Once this many frames were sent since the base was last heard, motion is held back. So is the mode that some
+# models need again and again while armed. A base that works sends several frames each 20 ms. SocketCAN queues
+# 10 frames (txqueuelen), so there is room for a zero behind these.
+_MAX_UNHEARD = 2
 
 
 def no_can_frames_hint() -> str:
@@ -89,11 +97,12 @@ class AgilexChassis(ChassisDriver):
         self._period_ns = config.command_period_ms * NS_PER_MS
         self._motion_sent_ns: int | None = None
         self._moving = False
+        self._sent_unheard = 0
         self._mode_sent_ns: int | None = None
 
     def _receive(self, now_ns: int) -> bool:
         messages: list[AgilexMessage] = []
-        received = False
+        received = heard = False
         try:
             for _ in range(_MAX_FRAMES):
                 frame = self._link.receive()
@@ -101,6 +110,7 @@ class AgilexChassis(ChassisDriver):
                     break
                 received = True
                 if frame.arbitration_id in _UNUSED_IDS:
+                    heard = True
                     self._feedback.note_actuator(frame.arbitration_id - _FIRST_ACTUATOR)
                     continue
                 message = decode(frame)
@@ -115,12 +125,15 @@ class AgilexChassis(ChassisDriver):
             if self._other_master is not None:
                 self._other_master.step(now_ns)
             self._feedback.update(messages, now_ns)
+            if heard or messages:
+                self._sent_unheard = 0
         return received
 
     def _send(self, command: Setpoint, now_ns: int) -> Setpoint | None:
         if self._other_master_drives:
             return None
         motion_due = due(self._motion_sent_ns, self._period_ns, now_ns) or (self._moving and is_zero(command))
+        motion_due = motion_due and (is_zero(command) or self._heard_lately)
         if motion_due:
             self._send_motion(command, now_ns)
         mode = self._mode_to_send(now_ns)
@@ -149,6 +162,10 @@ class AgilexChassis(ChassisDriver):
         """Whether somebody else commands a base that this driver never asked to obey."""
         return not self._arming_begun and self._other_master is not None and self._other_master.sentence != ""
 
+    @property
+    def _heard_lately(self) -> bool:
+        return self._sent_unheard < _MAX_UNHEARD
+
     def _mode_to_send(self, now_ns: int) -> int | None:
         """The mode of the 0x421 that is due, or None.
 
@@ -158,9 +175,8 @@ class AgilexChassis(ChassisDriver):
         mode = self._arming.mode
         if mode is ChassisMode.ARMED:
             period_ms = self._model.mode_period_ms
-            if period_ms is not None and due(self._mode_sent_ns, period_ms * NS_PER_MS, now_ns):
-                return self._command_mode
-            return None
+            repeated = period_ms is not None and due(self._mode_sent_ns, period_ms * NS_PER_MS, now_ns)
+            return self._command_mode if repeated and self._heard_lately else None
         if not due(self._mode_sent_ns, _MODE_RETRY_NS, now_ns):
             return None
         if mode is ChassisMode.ARMING:
@@ -170,10 +186,14 @@ class AgilexChassis(ChassisDriver):
     def _send_motion(self, command: Setpoint, now_ns: int) -> None:
         # The base turns by 1 / slip_factor of what its tracks say, so ask for slip_factor times as much.
         w_radps = command.w_radps * self._slip_factor
-        self._link.send(encode(MotionCommand(command.v_mps, w_radps)))
+        self._send_message(MotionCommand(command.v_mps, w_radps))
         self._motion_sent_ns = now_ns
         self._moving = not is_zero(command)
 
     def _send_mode(self, mode: int, now_ns: int) -> None:
-        self._link.send(encode(ControlModeCommand(mode)))
+        self._send_message(ControlModeCommand(mode))
         self._mode_sent_ns = now_ns
+
+    def _send_message(self, message: MotionCommand | ControlModeCommand) -> None:
+        self._sent_unheard += 1
+        self._link.send(encode(message))

@@ -210,7 +210,9 @@ class AgilexFeedback:
             faults = ", ".join(self.faults) or "no fault named"
             return f"the base reports an exception (vehicle state {state.vehicle_state}: {faults})"
         if state.control_mode in self._other_control_modes:
-            return f"{self._model.describe_mode(state.control_mode)} has taken over"
+            taken_over = f"{self._model.describe_mode(state.control_mode)} has taken over"
+            by_remote = state.control_mode in self._model.modes_remote
+            return f"{taken_over}: {self._model.remote_release}" if by_remote else taken_over
         return self._disagreement.sentence
 
     def update(self, messages: Sequence[AgilexMessage], now_ns: int) -> None:

@@ -30,6 +30,10 @@ _DRIVER_NO_FAULTS = 0x40 | 0x80
 # 0x211 byte 1 as in the vendor's SDK.
 _SDK_MODES: Mapping[int, str] = MappingProxyType({0: "standby", 1: "CAN", 2: "serial", 3: "remote control"})
 
+# The switch of the vendor's remote control: up is command mode, the middle is remote control (SCOUT MINI).
+# Remote control outranks 0x421 (BUNKER MINI manual p. 7, table 3.5).
+_REMOTE_RELEASE = "switch it to command mode (SWB up), or off"
+
 
 @dataclass(frozen=True, slots=True)
 class AgilexModel:
@@ -39,6 +43,7 @@ class AgilexModel:
     mode_names: names of the values of 0x211 byte 1.
     mode_can, mode_serial: the value that means "obeys this wire" (None: no serial port of this protocol).
     modes_remote: the values that mean that a person drives.
+    remote_release: how that person hands the base over to the computer.
     system_faults: bits of 0x211 bytes 4-5, byte 4 the higher one.
     driver_faults: bits of 0x261+n byte 5. A set bit without an entry is reported, too.
     base_timeout_ms: the base stops by itself after this time without 0x111.
@@ -57,6 +62,7 @@ class AgilexModel:
     mode_can: int = 1
     mode_serial: int | None = 2
     modes_remote: frozenset[int] = frozenset({3})
+    remote_release: str = _REMOTE_RELEASE
     system_faults: Mapping[int, str] = field(default_factory=lambda: MappingProxyType({}))
     driver_faults: Mapping[int, str] = field(default_factory=lambda: _SDK_DRIVER_FAULTS)
     base_timeout_ms: int = 500

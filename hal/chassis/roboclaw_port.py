@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from hal.api import SerialLink
-from hal.chassis.late_answer import late_answer
+from hal.chassis.outstanding import OutstandingRequest
 from hal.chassis.reading import read_all
 from hal.chassis.roboclaw_packets import Request
 from hal.clocks import NS_PER_MS
@@ -40,25 +41,25 @@ class RoboclawPort:
     missing answer is not repeated: if it came late, it would be taken for the answer to the repetition.
 
     bytes_received: all bytes that ever arrived.
-    late_answer: how late the last answer came; "" if a query has been answered in time since.
     """
 
     def __init__(self, link: SerialLink, address: int) -> None:
         self._link = link
         self._address = address
-        self._request: Request | None = None
-        self._sent_ns = 0
+        self._outstanding = OutstandingRequest[Request](_REPLY_TIMEOUT_NS, _SILENCE_NS)
         self._received = bytearray()
         self._received_ns = 0
-        self._quiet_until_ns = 0
         self._repeatable = False
-        self._timed_out: tuple[Request, int] | None = None
         self.bytes_received = 0
-        self.late_answer = ""
+
+    @property
+    def late_answer(self) -> str:
+        """How late the last answer came; "" if a query has been answered in time since."""
+        return self._outstanding.late_answer
 
     def idle(self, now_ns: int) -> bool:
-        """Whether no answer is awaited, and no period of silence is being kept."""
-        return self._request is None and now_ns >= self._quiet_until_ns
+        """Whether a request may be started."""
+        return self._outstanding.idle(now_ns)
 
     def start(self, request: Request, now_ns: int) -> None:
         """Write the request. Raises LinkLost."""
@@ -67,9 +68,7 @@ class RoboclawPort:
 
     def abandon(self, now_ns: int) -> None:
         """Forget the current request. If its answer still comes, it falls into a period of silence."""
-        if self._request is not None:
-            self._request = None
-            self._quiet_until_ns = now_ns + _REPLY_TIMEOUT_NS
+        self._outstanding.abandon(now_ns)
 
     def poll(self, now_ns: int) -> Answer | None:
         """Read what has arrived; return the answer if the current request has ended, successfully or not.
@@ -78,46 +77,39 @@ class RoboclawPort:
         """
         arrived = read_all(self._link)
         self.bytes_received += len(arrived)
-        request = self._request
+        request, sent_ns = self._outstanding.request, self._outstanding.sent_ns
         if request is None:
             if arrived:  # Not asked for: noise, or an answer that came too late.
-                self._note_late(arrived, now_ns)
-                self._quiet_until_ns = max(self._quiet_until_ns, now_ns + _SILENCE_NS)
+                self._outstanding.note_stray(self._answered_by(arrived), now_ns)
             return None
         if arrived:
             self._received += arrived
             self._received_ns = now_ns
-        too_late = now_ns - self._sent_ns >= _REPLY_TIMEOUT_NS
+        too_late = self._outstanding.expired(now_ns)
         data = self._complete(request, now_ns, too_late)
-        failed = len(self._received) >= request.longest_reply or too_late
-        if data is None and not failed:
-            return None
         if data is None:
-            self._note_late(bytes(self._received), now_ns)
+            if len(self._received) < request.longest_reply and not too_late:
+                return None
+            self._outstanding.note_late(self._answered_by(bytes(self._received)), now_ns)
             if self._repeatable and not too_late and not self.late_answer:
                 self._repeatable = False
                 self._write(request, now_ns)
                 return None
-            if too_late:
-                self._timed_out = request, self._sent_ns
-            self._quiet_until_ns = now_ns + _SILENCE_NS
-        elif request.reply_lengths:  # Answers come in order: none of an earlier request is still to come.
-            self.late_answer, self._timed_out = "", None
-        self._request = None
-        return Answer(request, data, self._sent_ns)
+            self._outstanding.fail(now_ns)
+        elif request.reply_lengths:
+            self._outstanding.answered()
+        else:  # The same byte acknowledges every command.
+            self._outstanding.acknowledged()
+        return Answer(request, data, sent_ns)
 
     def _write(self, request: Request, now_ns: int) -> None:
         self._link.write(request.packet(self._address))
-        self._request, self._sent_ns, self._received_ns = request, now_ns, now_ns
+        self._outstanding.begin(request, now_ns)
+        self._received_ns = now_ns
         self._received.clear()
 
-    def _note_late(self, received: bytes, now_ns: int) -> None:
-        """Keep how late it is if these bytes are the answer to the request that timed out last."""
-        if self._timed_out is None:
-            return
-        request, sent_ns = self._timed_out
-        if request.accept(self._address, received) is not None:
-            self.late_answer = late_answer(now_ns - sent_ns, _REPLY_TIMEOUT_NS)
+    def _answered_by(self, received: bytes) -> Callable[[Request], bool]:
+        return lambda request: request.accept(self._address, received) is not None
 
     def _complete(self, request: Request, now_ns: int, last_chance: bool) -> bytes | None:
         """The data once the answer is complete, else None.

@@ -15,10 +15,9 @@ from hal.chassis import roboteq_lines as lines
 from hal.chassis.arming import ArmingLimits
 from hal.chassis.command import CommandLimits, due, fit_tracks, is_zero
 from hal.chassis.driver import ChassisDriver
-from hal.chassis.late_answer import late_answer
-from hal.chassis.reading import read_all
 from hal.chassis.roboteq_feedback import RoboteqFeedback
-from hal.chassis.roboteq_lines import LineReader, Query, Reply
+from hal.chassis.roboteq_lines import Query, Reply
+from hal.chassis.roboteq_port import RoboteqPort
 from hal.chassis.tracks import TrackGeometry
 from hal.clocks import NS_PER_MS
 from hal.errors import LinkLost
@@ -37,12 +36,6 @@ _OTHER_QUERIES = (
     lines.MOTOR_FLAGS,
     lines.CURRENTS,
 )
-
-# USB adapters hold bytes back for up to 16 ms; the controller answers within a few milliseconds.
-_REPLY_TIMEOUT_NS = 40 * NS_PER_MS
-
-# Silence after a lost answer, so that it is not taken for the answer to the next query if it comes late.
-_SILENCE_NS = 10 * NS_PER_MS
 
 # A base that still moves after this time of zero commands does not follow them: !EX cuts the motors.
 _STOP_TIMEOUT_NS = 3_000 * NS_PER_MS
@@ -66,51 +59,30 @@ class RoboteqChassis(ChassisDriver):
             max_step_gap_ns=config.watchdog_ms * NS_PER_MS,
         )
         super().__init__(link, feedback, commands, limits, config.battery_low_v)
-        self._link = link
+        self._port = RoboteqPort(link)
         self._config = config
         self._geometry = geometry
         self._feedback = feedback
         self._period_ns = config.command_period_ms * NS_PER_MS
         # Half of the watchdog's time: the delay of the line is unknown, and an extra zero costs nothing.
         self._gap_ns = config.watchdog_ms * NS_PER_MS // 2
-        self._reader = LineReader()
         counters = lines.ENCODERS if config.encoder == "quadrature" else lines.HALL_COUNTERS
         self._queries = cycle([lines.QUERIES[name] for other in _OTHER_QUERIES for name in (counters, other)])
-        self._pending_query: Query | None = None
-        self._query_sent_ns = 0
-        self._timed_out: tuple[str, int] | None = None
-        self._late = ""
-        self._quiet_until_ns = 0
         self._setup = b""
         self._motion_sent_ns: int | None = None
         self._moving = False
 
     def _receive(self, now_ns: int) -> bool:
-        arrived = read_all(self._link)
-        self._feedback.bytes_received += len(arrived)
-        for line in self._reader.feed(arrived):
+        received_before = self._port.bytes_received
+        for line in self._port.poll(now_ns):
             if line is Reply.ECHO:
                 self._feedback.note_echo()
             elif isinstance(line, Reply):
                 self._feedback.note_reply(line is Reply.ACCEPTED)
-            elif self._pending_query is not None and line.name == self._pending_query.name:
-                self._pending_query = None
-                self._late, self._timed_out = "", None  # Answers come in order.
-                self._feedback.take(line.name, line.values, self._query_sent_ns, now_ns)
-            else:  # An answer that came too late, or that was not asked for.
-                self._note_late(line.name, now_ns)
-                self._quiet_until_ns = max(self._quiet_until_ns, now_ns + _SILENCE_NS)
-        if self._pending_query is not None and now_ns - self._query_sent_ns >= _REPLY_TIMEOUT_NS:
-            self._timed_out = self._pending_query.name, self._query_sent_ns
-            self._pending_query = None
-            self._reader.forget()
-            self._quiet_until_ns = now_ns + _SILENCE_NS
-        return bool(arrived)
-
-    def _note_late(self, name: str, now_ns: int) -> None:
-        """Keep how late it is if this is the answer to the query that timed out last."""
-        if self._timed_out is not None and self._timed_out[0] == name:
-            self._late = late_answer(now_ns - self._timed_out[1], _REPLY_TIMEOUT_NS)
+            else:
+                self._feedback.take(line.value.name, line.value.values, line.requested_ns, now_ns)
+        self._feedback.bytes_received = self._port.bytes_received
+        return self._port.bytes_received > received_before
 
     def _send(self, command: Setpoint, now_ns: int) -> Setpoint | None:
         stopping = self._moving and is_zero(command)
@@ -124,19 +96,16 @@ class RoboteqChassis(ChassisDriver):
         if self._ignores_zero(now_ns):
             data += lines.EMERGENCY_STOP
         query = None
-        if self._pending_query is None and now_ns >= self._quiet_until_ns:
+        if self._port.idle(now_ns):
             query = lines.QUERIES[lines.WATCHDOG] if setup else next(self._queries)
-            data += query.line
-        self._write(data, now_ns)
+        self._write(data, query, now_ns)
         self._moving = not is_zero(command)
-        if query is not None:
-            self._pending_query, self._query_sent_ns = query, now_ns
         return sent
 
     def _send_stop(self, now_ns: int) -> None:
         self._feedback.forget_setup()
         self._setup = b""
-        self._write(lines.STOP, now_ns)
+        self._write(lines.STOP, None, now_ns)
         self._moving = False
 
     def _begin_arming(self) -> None:
@@ -147,7 +116,7 @@ class RoboteqChassis(ChassisDriver):
         self._setup = lines.STOP + lines.ECHO_OFF + watchdog + lines.RELEASE
 
     def _late_answer(self) -> str:
-        return self._late
+        return self._port.late_answer
 
     def _resettable(self) -> bool:
         # Only an emergency stop can be reset. A fault beside it must disappear by itself.
@@ -157,9 +126,9 @@ class RoboteqChassis(ChassisDriver):
         last_ns = self._motion_sent_ns
         return b"" if last_ns is not None and 0 <= now_ns - last_ns < self._gap_ns else lines.STOP
 
-    def _write(self, data: bytes, now_ns: int) -> None:
+    def _write(self, data: bytes, query: Query | None, now_ns: int) -> None:
         try:
-            self._link.write(data)
+            self._port.write(data, query, now_ns)
         except LinkLost:
             # It is unknown how much of it arrived, so the next command must be zero.
             self._motion_sent_ns = None

@@ -1,7 +1,8 @@
 """Links in memory that fail on demand, for tests and for emulators in the same process.
 
 ``can_pair()`` and ``serial_pair()`` make the two ends of one wire. Each end can be unplugged, can refuse to
-write, and can be made to receive noise, wrong bytes, a few bytes at a time or nothing.
+write, can be parted from the other one, and can be made to receive noise, wrong bytes, a few bytes at a time
+or nothing.
 """
 
 from __future__ import annotations
@@ -53,19 +54,33 @@ class _ScriptedLink:
             raise LinkLost("scripted link: write failed")
 
 
+# Frames that SocketCAN keeps by default while no node acknowledges them.
+_TX_QUEUE_LEN = 10
+
+
 class ScriptedCanLink(_ScriptedLink):
-    """One end of a CAN wire. sent: the frames that were sent, in order."""
+    """One end of a CAN wire. sent: the frames that were sent, in order.
+
+    waiting: frames that were sent while the cable is out.
+    """
 
     def __init__(self) -> None:
         super().__init__()
         self.sent: list[CanFrame] = []
+        self.waiting: deque[CanFrame] = deque()
         self.peer: ScriptedCanLink | None = None
+        self._cable_out = False
         self._arrived: deque[CanFrame] = deque()
         self._filter: Callable[[CanFrame], CanFrame | None] = lambda frame: frame
 
     def send(self, frame: CanFrame) -> None:
         """See hal.api.CanLink."""
         self._check_write()
+        if self._cable_out:
+            if len(self.waiting) >= _TX_QUEUE_LEN:
+                raise LinkLost("scripted link: transmit buffer full")
+            self.waiting.append(frame)
+            return
         self.sent.append(frame)
         if self.peer is not None:
             self.peer.deliver(frame)
@@ -78,9 +93,19 @@ class ScriptedCanLink(_ScriptedLink):
     def deliver(self, *frames: CanFrame) -> None:
         """Make these frames arrive here, through the filter. Nothing arrives at an unplugged end."""
         for frame in frames:
-            passed = self._filter(frame) if self._plugged else None
+            passed = self._filter(frame) if self._plugged and not self._cable_out else None
             if passed is not None:
                 self._arrived.append(passed)
+
+    def pull_cable(self) -> None:
+        """Part the adapter from the bus: nothing arrives, and what is sent waits as in SocketCAN's queue."""
+        self._cable_out = True
+
+    def connect_cable(self) -> None:
+        """Join the adapter and the bus again: what waits goes out first."""
+        self._cable_out = False
+        while self.waiting:
+            self.send(self.waiting.popleft())
 
     def set_filter(self, transform: Callable[[CanFrame], CanFrame | None]) -> None:
         """Change (or, with None, drop) every frame before it arrives here."""
@@ -104,12 +129,15 @@ class ScriptedSerialLink(_ScriptedLink):
         self.written: list[bytes] = []
         self.peer: ScriptedSerialLink | None = None
         self._arrived = bytearray()
+        self._cable_out = False
         self._filter: Callable[[bytes], bytes] = lambda data: data
         self._max_read: int | None = None
 
     def write(self, data: bytes) -> None:
         """See hal.api.SerialLink."""
         self._check_write()
+        if self._cable_out:
+            return
         self.sent += data
         self.written.append(data)
         if self.peer is not None:
@@ -125,8 +153,16 @@ class ScriptedSerialLink(_ScriptedLink):
 
     def deliver(self, data: bytes) -> None:
         """Make these bytes arrive here, through the filter. Nothing arrives at an unplugged end."""
-        if self._plugged:
+        if self._plugged and not self._cable_out:
             self._arrived += self._filter(data)
+
+    def pull_cable(self) -> None:
+        """Part the port from the other end: what either sends is lost, without an error."""
+        self._cable_out = True
+
+    def connect_cable(self) -> None:
+        """Join both ends again."""
+        self._cable_out = False
 
     def limit_reads(self, count: int | None) -> None:
         """Let each read give at most count bytes; None: all that is there (several messages merged)."""

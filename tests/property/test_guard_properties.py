@@ -14,7 +14,7 @@ from hal.types import Setpoint
 
 PERIOD_NS = 20_000_000
 ROBOT = Limits()
-LIMITS = GuardLimits.of(ROBOT, 0.02)
+LIMITS = GuardLimits.of(ROBOT, 0.02, 0.1)
 
 commands = st.tuples(
     st.one_of(st.sampled_from([0.0, 0.3, 1.5, 9.0, math.nan]), st.floats(0.0, 2.0)),

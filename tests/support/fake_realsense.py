@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from enum import StrEnum
 from types import SimpleNamespace
 
 import numpy as np
@@ -98,6 +99,14 @@ def framesets(first: int, count: int) -> Iterator[FakeFrameset]:
     return (frameset(number) for number in range(first, first + count))
 
 
+class FakeOption(StrEnum):
+    auto_exposure_priority = "auto_exposure_priority"
+    global_time_enabled = "global_time_enabled"
+    visual_preset = "visual_preset"
+    exposure = "exposure"
+    laser_power = "laser_power"
+
+
 class FakeSensor:
     def __init__(self, supported: set[str]) -> None:
         self._supported = supported
@@ -107,6 +116,8 @@ class FakeSensor:
         return option in self._supported
 
     def set_option(self, option: str, value: float) -> None:
+        if value < 0.0:
+            raise RuntimeError("out of range")
         self.options[option] = value
 
     def get_depth_scale(self) -> float:
@@ -168,7 +179,10 @@ class FakeDevice:
     sensors: list[FakeSensor] = field(
         default_factory=lambda: [FakeSensor({"global_time_enabled"}), FakeSensor({"auto_exposure_priority"})]
     )
-    depth_sensor: FakeSensor = field(default_factory=lambda: FakeSensor(set()))
+    depth_sensor: FakeSensor = field(
+        default_factory=lambda: FakeSensor({"visual_preset", "exposure", "global_time_enabled"})
+    )
+    colour_sensor: FakeSensor = field(default_factory=lambda: FakeSensor({"exposure"}))
 
     def get_info(self, key: str) -> str:
         return {"serial_number": self.serial, "name": "D435I (fake)"}[key]
@@ -181,6 +195,9 @@ class FakeDevice:
 
     def first_depth_sensor(self) -> FakeSensor:
         return self.depth_sensor
+
+    def first_color_sensor(self) -> FakeSensor:
+        return self.colour_sensor
 
 
 class FakeConfig:
@@ -245,9 +262,7 @@ class FakeRealsense:
 
     stream = SimpleNamespace(color="color", depth="depth", gyro="gyro")
     format = SimpleNamespace(bgr8="bgr8", z16="z16", motion_xyz32f="motion_xyz32f")
-    option = SimpleNamespace(
-        auto_exposure_priority="auto_exposure_priority", global_time_enabled="global_time_enabled"
-    )
+    option = FakeOption
     camera_info = SimpleNamespace(serial_number="serial_number", name="name")
     config = FakeConfig
     align = FakeAlign

@@ -108,7 +108,9 @@ def test_a_latched_chassis_ends_the_drive_with_its_reason() -> None:
 
 
 def test_a_chassis_that_never_arms_is_given_up() -> None:
-    loop = loop_on(ObedientChassis(arms_after=10**9))
+    chassis = ObedientChassis()
+    chassis.fault = ChassisMode.STANDBY
+    loop = loop_on(chassis)
     taken = drive(loop, 1000)
     assert loop.ending.outcome is Outcome.NOT_ARMED
     assert taken[-1].now_ns == pytest.approx(5.02e9, abs=0.05e9)

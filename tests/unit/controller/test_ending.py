@@ -171,6 +171,13 @@ def test_a_chassis_that_disarms_itself_has_ended_the_drive() -> None:
 
 def test_arming_is_waited_for_but_not_for_ever() -> None:
     drive = Drive()
-    assert drive.run(ARM_TIMEOUT_S, ChassisMode.ARMING) is None
-    drive.run(1.0, ChassisMode.ARMING)
-    assert (drive.ending.outcome, drive.ending.stop_reason) == (Outcome.NOT_ARMED, "it is arming")
+    assert drive.run(ARM_TIMEOUT_S, ChassisMode.STANDBY) is None
+    drive.run(1.0, ChassisMode.STANDBY)
+    assert (drive.ending.outcome, drive.ending.stop_reason) == (Outcome.NOT_ARMED, "it is standby")
+
+
+def test_how_long_arming_takes_is_up_to_the_driver() -> None:
+    drive = Drive()
+    assert drive.run(60.0, ChassisMode.ARMING) is None
+    drive.run(PERIOD_S, ChassisMode.STANDBY)
+    assert (drive.ending.outcome, drive.ending.stop_reason) == (Outcome.NOT_ARMED, "it is standby")

@@ -20,7 +20,7 @@ from hal.types import CanFrame, ChassisMode, ChassisState, Setpoint
 from tests.support.chassis_rig import MS, Rig, agilex_rig, kobuki_rig, roboclaw_rig, roboteq_rig
 
 # The paper's limits, and ours in an emergency: 1.5 m/s, 0.8 rad/s, +0.3 and -0.7 m/s2, 2 m/s3, 50 Hz.
-LIMITS = GuardLimits.of(Limits(), 0.02)
+LIMITS = GuardLimits.of(Limits(), 0.02, 0.1)
 NOW = 1_000 * MS
 LAST = Setpoint(NOW - 20 * MS, 1.0, 0.0, 0.0)
 
@@ -86,7 +86,8 @@ def test_its_own_check_finds_a_gate_that_is_open(monkeypatch: pytest.MonkeyPatch
     assert "no limits" in self_check(replace(LIMITS, max_speed_mps=math.nan))
     assert "no limits" in self_check(replace(LIMITS, max_jerk_mps3=math.inf))
     assert "no limits" in self_check(replace(LIMITS, max_accel_mps2=0.0))
-    assert self_check(GuardLimits(0.01, 0.01, 5.0, 10.0, 100.0, 0.1)) == "", "however odd, they are limits"
+    odd = GuardLimits(0.01, 0.01, 5.0, 10.0, 100.0, 0.1, 0.1)
+    assert self_check(odd) == "", "however odd, they are limits"
     true_gate = guard.objection
     for blind_to, lets_pass in (
         ("not finite", "NaN"),

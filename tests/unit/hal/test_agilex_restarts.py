@@ -37,6 +37,7 @@ def test_an_odometer_that_jumps_latches_until_consent() -> None:
         if k % 10 == 0:
             bench.deliver(state(CAN))
         assert drive(bench, 6 * k).mode is ChassisMode.ARMED
+    bench.deliver(MotionFeedback(0.3, 0.0))
     bench.exchange(0.3, after_ms=60)
     seen = drive(bench, 0)
     assert (seen.mode, seen.reason) == (

@@ -71,7 +71,7 @@ def decide_slowly(takes_ms: float) -> list[ChassisState]:
     the states of all of them."""
     clock, states = SimulatedClock(), list[ChassisState]()
     with agilex_rig("scripted") as rig:
-        guarded = GuardedChassis(rig.chassis, GuardLimits.of(Limits(), 0.02))
+        guarded = GuardedChassis(rig.chassis, GuardLimits.of(Limits(), 0.02, 0.1))
         punctual = PunctualChassis(guarded, clock, PERIOD_NS)
         began_ns, v, a = PERIOD_NS, 0.0, 0.0
         punctual.arm(began_ns)
