@@ -149,7 +149,7 @@ class ControlLoop:
         target_mps = 0.0 if self.ending.stop_reason is not None else decision.target_speed_mps
         shaped = self._shape.step(
             min(target_mps, answer.cap_mps),
-            emergency=decision.emergency or answer.hard or self.localiser.contradiction != "",
+            emergency=decision.emergency or answer.hard,
             distance_to_end_m=self.path.length_m - self._progress_m,
         )
         w_radps = self._follow.step(on_path, shaped.v_mps)

@@ -6,6 +6,7 @@ Each step calls begin(), answer(), exchange() and conclude(), in this order.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from controller.answer import ANSWERS, Answer, BaseAnswer
 from controller.ending import Ending, Outcome
@@ -59,7 +60,8 @@ class DrivenBase:
     def answer(self, commanded_mps: float, now_ns: int) -> Answer:
         """Whether the base does what it was told; requests a stop where nothing helps.
 
-        commanded_mps: the last command. While the chassis does not obey, what it does is no answer.
+        commanded_mps: the last command. While the chassis does not obey, what it does is no answer. While the
+        images contradict the odometry, every command is a hard one: the base may go anywhere.
         """
         if self.state is None or not self.obeys:
             self._answer.restart()
@@ -67,7 +69,7 @@ class DrivenBase:
         answer = self._answer.step(commanded_mps, self.state.v_mps, self.state.feedback_ns, now_ns)
         if answer.ends:
             self.ending.request_stop(answer.zero, Outcome.BROKEN_OFF)
-        return answer
+        return replace(answer, hard=True) if self.localiser.contradiction else answer
 
     def exchange(self, setpoint: Setpoint, now_ns: int, *, zero: bool) -> ChassisState:
         """Send the setpoint, and take in the state and the odometry that come back.

@@ -263,7 +263,8 @@ class SpeedGovernor:
 
     def _command(self, decision: Decision, answer: Answer) -> Governed:
         turns = self._motion.kind is Kind.TURN
-        target_mps = decision.target_speed_mps if turns else min(decision.target_speed_mps, answer.cap_mps)
+        # In a turn the commanded speed ahead is 0, so a cap of 0 means that the base runs away: end the turn.
+        target_mps = min(decision.target_speed_mps, answer.cap_mps)
         shaped = self._shape.step(target_mps, emergency=decision.emergency or answer.hard)
         self._has_moved = self._has_moved or shaped.v_mps > 0.0
         if turns:
