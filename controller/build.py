@@ -244,13 +244,13 @@ def _fps(config: AppConfig) -> float:
     return REPLAY_FPS if isinstance(config.camera, ReplayCameraConfig) else float(config.camera.fps)
 
 
-def open_commands(config: InputConfig) -> DatagramLink:
+def open_commands(config: InputConfig, config_path: FilePath) -> DatagramLink:
     """The socket at which a governor's commands arrive, not yet entered."""
     match config:
         case UdpInputConfig():
             return UdpSocket(config.host, config.port)
         case UnixInputConfig():
-            return UnixSocket(FilePath(config.path).expanduser(), config.group_may_command)
+            return UnixSocket(resolve(config.path, config_path), config.group_may_command)
         case unknown:
             assert_never(unknown)
 

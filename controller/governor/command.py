@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path as FilePath
 
 from config.app import AppConfig, RealtimeRunner, load_app
 from config.governor import GovernorConfig, InputConfig, UdpInputConfig
+from config.loader import resolve
 from controller.build import open_commands
 from controller.control import ControlStep
 from controller.ending import Outcome
@@ -65,7 +67,10 @@ def _govern(
     options: MissionOptions,
     console: Console,
 ) -> Governing:
-    with realtime_rig(config, runner, options) as rig, open_commands(governor.input) as link:
+    with (
+        realtime_rig(config, runner, options) as rig,
+        open_commands(governor.input, options.config_path) as link,
+    ):
         inbox = build_inbox(link, governor, console.event)
         loop = build_governor_loop(config, options.config_path, rig.chassis, inbox)
         setpoints = SetpointTally(config.robot.limits, 1.0 / runner.control_rate_hz)
@@ -79,7 +84,7 @@ def _govern(
         )
 
         def ready(service: ServiceManager) -> None:
-            console.event(f"ready: commands are heard on {_where(governor.input)}")
+            console.event(f"ready: commands are heard on {_where(governor.input, options.config_path)}")
             service.ready("governing")
 
         with rig.under_way(loop, console, ready) as moments:
@@ -91,8 +96,10 @@ def _govern(
     return governing
 
 
-def _where(config: InputConfig) -> str:
-    return f"udp {config.host}:{config.port}" if isinstance(config, UdpInputConfig) else config.path
+def _where(config: InputConfig, config_path: FilePath) -> str:
+    if isinstance(config, UdpInputConfig):
+        return f"udp {config.host}:{config.port}"
+    return str(resolve(config.path, config_path))
 
 
 def _report(console: Console, governing: Governing, step: ControlStep) -> None:
