@@ -10,7 +10,6 @@ import math
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from controller.answer import BaseAnswer
 from controller.decision.decision import Decision
 from controller.decision.limits import speed_to_decide_by
 from controller.decision.situation import Situation
@@ -19,6 +18,7 @@ from controller.ending import Ending, Outcome
 from controller.follow import PathFollower
 from controller.localise import Localiser
 from controller.path.path import OnPath, Path
+from controller.response_monitor import ResponseMonitor
 from controller.shape import SpeedShaper
 from hal.api import Chassis
 from hal.types import ChassisState, FloatArray, PlanarPose, Setpoint
@@ -86,14 +86,14 @@ class ControlLoop:
         follow: PathFollower,
         localiser: Localiser,
         chassis: Chassis,
-        answer: BaseAnswer,
+        response: ResponseMonitor,
     ) -> None:
         self.path = path
         self.localiser = localiser
         self._decide = decide
         self._shape = shape
         self._follow = follow
-        self._base = DrivenBase(chassis, localiser, answer)
+        self._base = DrivenBase(chassis, localiser, response)
         self._progress_m = 0.0
 
     @property
@@ -111,7 +111,7 @@ class ControlLoop:
         self.ending.request_stop(reason, outcome)
 
     def step(self, scene: Scene | None, now_ns: int) -> ControlStep:
-        """Decide on what is known, shape, send, and take in what the chassis answers."""
+        """Decide on what is known, shape, send, and take in what the chassis returns."""
         self._base.begin(scene, now_ns)
         pose = self.localiser.pose
         on_path = self.path.project(pose, self._progress_m)
@@ -136,20 +136,20 @@ class ControlLoop:
     def _setpoint(self, decision: Decision, on_path: OnPath, now_ns: int) -> tuple[Setpoint, str, str]:
         """What to send, the shaper's fault, and why zero is asked for instead of the profile."""
         stand = Setpoint(now_ns, 0.0, 0.0, 0.0)
-        answer = self._base.answer(self._shape.v_mps, now_ns)
+        cap = self._base.speed_cap(self._shape.v_mps, now_ns)
         if not self._base.obeys:
             # The chassis does not follow setpoints now. When it does again, shaping begins from standstill.
             self._shape.reset()
             return stand, "", ""
-        if answer.zero:
+        if cap.zero_reason:
             self._shape.begin_anew()
-            return stand, "", answer.zero
-        if answer.dips:
+            return stand, "", cap.zero_reason
+        if cap.dips:
             self._shape.unlearn_lag()
         target_mps = 0.0 if self.ending.stop_reason is not None else decision.target_speed_mps
         shaped = self._shape.step(
-            min(target_mps, answer.cap_mps),
-            emergency=decision.emergency or answer.hard,
+            min(target_mps, cap.cap_mps),
+            emergency=decision.emergency or cap.hard,
             distance_to_end_m=self.path.length_m - self._progress_m,
         )
         w_radps = self._follow.step(on_path, shaped.v_mps)

@@ -1,6 +1,6 @@
 """The base as a control loop drives it: what the loop along a path and the governor's do alike in each step.
 
-Each step calls begin(), answer(), exchange() and conclude(), in this order.
+Each step calls begin(), speed_cap(), exchange() and conclude(), in this order.
 """
 
 from __future__ import annotations
@@ -8,26 +8,26 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from controller.answer import ANSWERS, Answer, BaseAnswer
 from controller.ending import Ending, Outcome
 from controller.localise import Localiser
+from controller.response_monitor import NO_CAP, ResponseMonitor, SpeedCap
 from hal.api import Chassis
 from hal.types import ChassisMode, ChassisState, Setpoint
 from vision.scene import Scene
 
 
 class DrivenBase:
-    """A chassis, with where it is, whether it answers its commands, and how its drive begins and ends.
+    """A chassis, with where it is, whether it responds to its commands, and how its drive begins and ends.
 
     state: what the chassis told last; None before the first exchange.
     """
 
-    def __init__(self, chassis: Chassis, localiser: Localiser, answer: BaseAnswer) -> None:
+    def __init__(self, chassis: Chassis, localiser: Localiser, response: ResponseMonitor) -> None:
         self.localiser = localiser
         self.ending = Ending(chassis)
         self.state: ChassisState | None = None
         self._chassis = chassis
-        self._answer = answer
+        self._response = response
         self._scene_ns: int | None = None
 
     @property
@@ -57,19 +57,19 @@ class DrivenBase:
             if self.localiser.contradiction:
                 self.ending.request_stop(self.localiser.contradiction, Outcome.BROKEN_OFF)
 
-    def answer(self, commanded_mps: float, now_ns: int) -> Answer:
+    def speed_cap(self, commanded_mps: float, now_ns: int) -> SpeedCap:
         """Whether the base does what it was told; requests a stop where nothing helps.
 
-        commanded_mps: the last command. While the chassis does not obey, what it does is no answer. While the
-        images contradict the odometry, every command is a hard one: the base may go anywhere.
+        commanded_mps: the last command. While the chassis does not obey, what it does is no response. While
+        the images contradict the odometry, every command is a hard one: the base may go anywhere.
         """
         if self.state is None or not self.obeys:
-            self._answer.restart()
-            return ANSWERS
-        answer = self._answer.step(commanded_mps, self.state.v_mps, self.state.feedback_ns, now_ns)
-        if answer.ends:
-            self.ending.request_stop(answer.zero, Outcome.BROKEN_OFF)
-        return replace(answer, hard=True) if self.localiser.contradiction else answer
+            self._response.restart()
+            return NO_CAP
+        cap = self._response.step(commanded_mps, self.state.v_mps, self.state.feedback_ns, now_ns)
+        if cap.ends:
+            self.ending.request_stop(cap.zero_reason, Outcome.BROKEN_OFF)
+        return replace(cap, hard=True) if self.localiser.contradiction else cap
 
     def exchange(self, setpoint: Setpoint, now_ns: int, *, zero: bool) -> ChassisState:
         """Send the setpoint, and take in the state and the odometry that come back.

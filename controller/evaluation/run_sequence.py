@@ -25,7 +25,7 @@ from controller.evaluation.timed_methods import (
 )
 from controller.evaluation.totals import PixelCounts
 from controller.evaluation.truth import FrameTruthBuilder
-from controller.evaluation.types import Answer, DetectedObject, FrameDetections, FrameTruth
+from controller.evaluation.types import DetectedObject, FrameDetections, FrameTruth, MethodOutput
 from hal.types import ColourImage, RgbdFrame
 from sim.rendering.camera import intrinsics_of
 from vision.scene import Fragments
@@ -134,7 +134,7 @@ class _Recorder:
             tuple(self._snapshot(index, records, scores[index]) for index in self._shown if scores),
         )
 
-    def _count_pixels(self, simulated: SimulatedFrame, answer: Answer) -> PixelCounts:
+    def _count_pixels(self, simulated: SimulatedFrame, answer: MethodOutput) -> PixelCounts:
         levels = claimed_levels(simulated.frame, answer.detections) if answer.mask is None else answer.mask
         judged_pixels = np.s_[::STEP_PX, ::STEP_PX]
         objects = simulated.truth.objects

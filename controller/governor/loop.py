@@ -9,7 +9,6 @@ from typing import Protocol
 
 import numpy as np
 
-from controller.answer import BaseAnswer
 from controller.control import ControlStep
 from controller.decision.decision import Decision
 from controller.driven_base import DrivenBase
@@ -18,6 +17,7 @@ from controller.governor.governor import SpeedGovernor
 from controller.governor.inbox import RequestState
 from controller.localise import Localiser
 from controller.record.recorder import path_ahead
+from controller.response_monitor import ResponseMonitor
 from hal.api import Chassis
 from hal.types import FloatArray, PlanarPose, Setpoint
 from vision.scene import Scene
@@ -44,12 +44,12 @@ class GovernorLoop:
         commands: Commands,
         localiser: Localiser,
         chassis: Chassis,
-        answer: BaseAnswer,
+        response: ResponseMonitor,
     ) -> None:
         self.localiser = localiser
         self._governor = governor
         self._commands = commands
-        self._base = DrivenBase(chassis, localiser, answer)
+        self._base = DrivenBase(chassis, localiser, response)
         self._commanded_mps = 0.0
         self._travelled_m = 0.0
         self._came_from = localiser.pose
@@ -73,16 +73,16 @@ class GovernorLoop:
         self._base.begin(scene, now_ns)
         asked = self._asked(now_ns)
         pose = self.localiser.pose
-        answer = self._base.answer(self._commanded_mps, now_ns)
-        if answer.zero or not self._base.obeys:
+        cap = self._base.speed_cap(self._commanded_mps, now_ns)
+        if cap.zero_reason or not self._base.obeys:
             # When the chassis follows setpoints again, shaping begins from standstill.
             self._governor.rest()
         governed = self._governor.step(
-            now_ns, scene, None if answer.zero else asked.twist, pose, self._base.measured_mps,
-            answer.zero or asked.silence, answer,
+            now_ns, scene, None if cap.zero_reason else asked.twist, pose, self._base.measured_mps,
+            cap.zero_reason or asked.silence, cap,
         )  # fmt: skip
         setpoint = Setpoint(now_ns, governed.v_mps, governed.a_mps2, governed.w_radps)
-        state = self._base.exchange(setpoint, now_ns, zero=answer.zero != "")
+        state = self._base.exchange(setpoint, now_ns, zero=cap.zero_reason != "")
         self._commanded_mps = governed.v_mps
         self._note_travel(pose)
         self._base.conclude(setpoint, now_ns, arrived=False)
@@ -91,7 +91,7 @@ class GovernorLoop:
         scene_ns = None if scene is None else scene.captured_ns
         return ControlStep(
             now_ns, pose, self._travelled_m, on_path.d_m, scene_ns, governed.decision, setpoint,
-            state, self._ahead(), governed.fault, answer.zero,
+            state, self._ahead(), governed.fault, cap.zero_reason,
         )  # fmt: skip
 
     def _asked(self, now_ns: int) -> RequestState:

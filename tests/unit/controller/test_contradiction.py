@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from config.robot import Robot
-from controller.answer import BaseAnswer
 from controller.contradiction import Contradiction, Motion
 from controller.control import ControlStep
 from controller.driven_base import DrivenBase
 from controller.ending import Outcome
 from controller.localise import Localiser
+from controller.response_monitor import ResponseMonitor
 from hal.geometry import camera_in_body
 from hal.types import Pose, Setpoint
 from tests.support.obedient_chassis import PERIOD_S, ObedientChassis
@@ -121,11 +121,11 @@ def test_every_command_is_a_hard_one_only_while_the_images_contradict_the_odomet
     contradicted: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     localiser = Localiser(ORIGIN, MOUNT)
-    base = DrivenBase(ObedientChassis(arms_after=0), localiser, BaseAnswer(0.2, 1.0))
+    base = DrivenBase(ObedientChassis(arms_after=0), localiser, ResponseMonitor(0.2, 1.0))
     base.begin(None, 0)
     base.exchange(Setpoint(0, 0.0, 0.0, 0.0), 0, zero=False)
     monkeypatch.setattr(Localiser, "contradiction", "goes elsewhere" if contradicted else "")
-    assert base.answer(0.0, PERIOD_NS).hard == contradicted
+    assert base.speed_cap(0.0, PERIOD_NS).hard == contradicted
 
 
 def brakes_harder_than_comfort(steps: list[ControlStep]) -> bool:

@@ -7,13 +7,13 @@ import pytest
 from config.decision import DecisionConfig
 from config.path import LineSpec, PathSpec
 from config.robot import Robot
-from controller.answer import BaseAnswer
 from controller.control import ControlLoop, ControlStep
 from controller.decision.decide import DecisionMaker
 from controller.ending import Outcome
 from controller.follow import PathFollower
 from controller.localise import Localiser
 from controller.path.path import Path
+from controller.response_monitor import ResponseMonitor
 from controller.shape import SpeedShaper
 from hal.api import Chassis
 from hal.types import CameraMount, ChassisMode, ChassisState, PlanarPose, Setpoint
@@ -34,7 +34,7 @@ def loop_on(chassis: Chassis, length_m: float = 3.0) -> ControlLoop:
         follow=PathFollower(path, ROBOT.limits),
         localiser=Localiser(path.start, MOUNT),
         chassis=chassis,
-        answer=BaseAnswer(0.2, ROBOT.limits.max_speed_mps),
+        response=ResponseMonitor(0.2, ROBOT.limits.max_speed_mps),
     )
 
 

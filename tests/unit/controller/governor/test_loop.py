@@ -12,7 +12,6 @@ import pytest
 from config.decision import DecisionConfig
 from config.governor import GovernorConfig
 from config.robot import Robot
-from controller.answer import BaseAnswer
 from controller.control import ControlStep
 from controller.decision.decision import Decision
 from controller.ending import ARM_TIMEOUT_S, Outcome
@@ -21,6 +20,7 @@ from controller.governor.inbox import RequestState
 from controller.governor.loop import GovernorLoop
 from controller.governor.request import Twist
 from controller.localise import Localiser
+from controller.response_monitor import ResponseMonitor
 from hal.types import CameraMount, ChassisMode, ChassisState, PlanarPose, Setpoint
 from tests.support.imperfect_base import ImperfectBase
 from tests.support.obedient_chassis import PERIOD_S, ObedientChassis
@@ -60,7 +60,7 @@ class Rig:
             self.planner,
             Localiser(ORIGIN, MOUNT),
             self.chassis,
-            BaseAnswer(0.2, ROBOT.limits.max_speed_mps),
+            ResponseMonitor(0.2, ROBOT.limits.max_speed_mps),
         )
         self.steps: list[ControlStep] = []
 
@@ -186,12 +186,12 @@ def test_the_way_ahead_is_the_arc_for_pictures() -> None:
 
 
 def test_a_base_that_fell_behind_is_told_zero_and_begins_again_gently() -> None:
-    """controller/answer.py, as in a drive along a path."""
+    """controller/response_monitor.py, as in a drive along a path."""
     base = ImperfectBase(unresponsive_s=(3.0, 3.8))
     planner = Planner(lambda _: GO)
     governor = SpeedGovernor(GovernorConfig(), DecisionConfig(), ROBOT, MOUNT, PERIOD_S)
-    answer = BaseAnswer(0.2, ROBOT.limits.max_speed_mps)
-    loop = GovernorLoop(governor, planner, Localiser(ORIGIN, MOUNT), base, answer)
+    response = ResponseMonitor(0.2, ROBOT.limits.max_speed_mps)
+    loop = GovernorLoop(governor, planner, Localiser(ORIGIN, MOUNT), base, response)
     steps = []
     for k in range(500):
         seen = scene(k * PERIOD_NS, k, space=free_space(), pose=loop.localiser.pose)
