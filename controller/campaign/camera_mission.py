@@ -27,7 +27,7 @@ from controller.campaign.drive_log import DriveLog
 from controller.campaign.noise_mission import GIVE_UP_S
 from controller.campaign.policies import build_policy
 from controller.campaign.stage import Stage
-from controller.ending import SETTLE_S, Outcome
+from controller.drive_lifecycle import SETTLE_S, Outcome
 from controller.errors import UserError
 from controller.lockstep import run_lockstep
 from controller.record.recorder import RecordingOptions, RunRecorder, open_recorder
@@ -106,7 +106,7 @@ def _drive(
             if monitor.given_up:
                 break
         recorder.finish()
-    if loop.ending.outcome is Outcome.REACHED:
+    if loop.lifecycle.outcome is Outcome.REACHED:
         log.reached_s = log.times_s[-1] - SETTLE_S - monitor.armed_s
     return log
 

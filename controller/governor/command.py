@@ -10,7 +10,7 @@ from config.governor import GovernorConfig, InputConfig, UdpInputConfig
 from config.loader import resolve
 from controller.build import open_commands
 from controller.control import ControlStep
-from controller.ending import Outcome
+from controller.drive_lifecycle import Outcome
 from controller.errors import UserError
 from controller.governor.build import build_governor_loop, build_inbox
 from controller.governor.inbox import Inbox
@@ -37,7 +37,7 @@ class Governing(DriveResult):
     @property
     def succeeded(self) -> bool:
         """Whether it ended on request, without contact, within the limits."""
-        return self.loop.ending.outcome is Outcome.STOPPED and self.clean
+        return self.loop.lifecycle.outcome is Outcome.STOPPED and self.clean
 
 
 def run_governor(options: MissionOptions) -> int:
@@ -118,11 +118,11 @@ def _summary_rows(config: AppConfig, governing: Governing) -> list[tuple[str, st
 
 def _drive_text(governing: Governing) -> str:
     last, loop = governing.last, governing.loop
-    ended = "ended" if loop.ending.outcome is None else loop.ending.outcome.value
+    ended = "ended" if loop.lifecycle.outcome is None else loop.lifecycle.outcome.value
     if last is None:
         return ended
     driven = f"{last.progress_m:.2f} m in {governing.duration_s:.1f} s"
-    return f"{ended} ({loop.ending.stop_reason}); {driven}"
+    return f"{ended} ({loop.lifecycle.stop_reason}); {driven}"
 
 
 def _commands_text(inbox: Inbox) -> str:

@@ -8,7 +8,7 @@ import pytest
 
 from config.robot import Robot
 from controller.control import ControlStep
-from controller.ending import Outcome
+from controller.drive_lifecycle import Outcome
 from controller.record.tally import SetpointTally
 from controller.response_monitor import ResponseMonitor, SpeedCap
 from tests.support.imperfect_base import ImperfectBase
@@ -21,7 +21,7 @@ LIMITS = Robot().limits
 def driven(base: ImperfectBase, length_m: float = 6.0) -> tuple[list[ControlStep], Outcome | None]:
     """The steps of a whole drive, and its end."""
     loop = loop_on(base, length_m)
-    return drive(loop, 2500), loop.ending.outcome
+    return drive(loop, 2500), loop.lifecycle.outcome
 
 
 @pytest.mark.parametrize("deaf_for_s", [0.6, 0.8, 1.0])

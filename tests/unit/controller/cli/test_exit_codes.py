@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 from config.robot import Limits
 from controller.cli.commands import cli
-from controller.ending import Outcome
+from controller.drive_lifecycle import Outcome
 from controller.governor.command import Governing
 from controller.mission.result import DriveResult, MissionResult
 from controller.record.tally import SetpointTally

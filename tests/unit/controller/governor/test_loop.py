@@ -14,7 +14,7 @@ from config.governor import GovernorConfig
 from config.robot import Robot
 from controller.control import ControlStep
 from controller.decision.decision import Decision
-from controller.ending import ARM_TIMEOUT_S, Outcome
+from controller.drive_lifecycle import ARM_TIMEOUT_S, Outcome
 from controller.governor.governor import SpeedGovernor
 from controller.governor.inbox import RequestState
 from controller.governor.loop import GovernorLoop
@@ -152,14 +152,17 @@ def test_a_latched_base_ends_it_and_no_command_leads_out() -> None:
     rig.run(3.0)
     rig.chassis.fault = ChassisMode.ESTOP
     rig.run(1.0)
-    assert (rig.loop.ending.outcome, rig.loop.ending.stop_reason) == (Outcome.CHASSIS_FAULT, "e-stop pressed")
+    assert (rig.loop.lifecycle.outcome, rig.loop.lifecycle.stop_reason) == (
+        Outcome.CHASSIS_FAULT,
+        "e-stop pressed",
+    )
     assert (len(rig.chassis.stopped_at_ns), len(rig.chassis.armed_at_ns)) == (1, 1)
 
 
 def test_a_base_that_never_arms_is_given_up() -> None:
     rig = Rig(arms_after=10**9)
     steps = rig.run(ARM_TIMEOUT_S + 1.0)
-    assert rig.loop.ending.outcome is Outcome.NOT_ARMED
+    assert rig.loop.lifecycle.outcome is Outcome.NOT_ARMED
     assert steps[-1].now_ns == pytest.approx((ARM_TIMEOUT_S + 0.02) * 1e9, abs=3e7)
 
 
@@ -170,7 +173,10 @@ def test_a_requested_stop_comes_to_rest_whatever_is_asked_and_ends(asked: Reques
     rig.loop.request_stop("SIGTERM received")
     rig.loop.request_stop("later", Outcome.BROKEN_OFF)
     steps = rig.run(20.0)
-    assert (rig.loop.ending.outcome, rig.loop.ending.stop_reason) == (Outcome.STOPPED, "SIGTERM received")
+    assert (rig.loop.lifecycle.outcome, rig.loop.lifecycle.stop_reason) == (
+        Outcome.STOPPED,
+        "SIGTERM received",
+    )
     last = steps[-1].setpoint
     assert (last.v_mps, last.a_mps2, last.w_radps) == (0.0, 0.0, 0.0)
     assert steps[-1].decision.reason.sentence == "SIGTERM received: stop"
