@@ -12,10 +12,12 @@ from controller import braking
 from controller.decision.decision import Reason
 from controller.governor.request import Twist
 from controller.path.path import Path
+from controller.path.path_speeds import YAW_RATE_FOR_THE_BEND, least_radius_m
 from hal.types import PlanarPose
 
-# Share of the yaw rate limit that an arc may use, as in controller/path/path.py; the rest is kept in reserve.
-_YAW_RATE_FOR_THE_BEND = 0.8
+# A requested arc is refused if it is within this factor of the tightest one that a path may have, so that
+# rounding does not make the path refuse it.
+_SPARE_RADIUS = 1.01
 # Slower requests count as standing: they are rounding errors of the planner or noise of encoders.
 STANDING_MPS = 0.005
 STANDING_RADPS = 0.005
@@ -63,14 +65,8 @@ def corner_m(robot: Robot) -> float:
 
 
 def tightest_m(robot: Robot) -> float:
-    """The least radius that can be driven: the inner track must not run backwards, and the path must accept
-    the bend (controller/path/path.py)."""
-    return 1.01 * max(robot.body.width_m / 2.0, _least_radius_by_yaw_m(robot))
-
-
-def _least_radius_by_yaw_m(robot: Robot) -> float:
-    # controller/path/path.py refuses a bend that cannot be driven at 0.1 m/s or more.
-    return 0.1 / (_YAW_RATE_FOR_THE_BEND * robot.limits.max_yaw_rate_radps)
+    """The least radius that is driven on request."""
+    return _SPARE_RADIUS * least_radius_m(robot)
 
 
 def understand(twist: Twist, robot: Robot) -> MotionRequest:
@@ -93,7 +89,7 @@ def understand(twist: Twist, robot: Robot) -> MotionRequest:
             why=f"a radius of {1.0 / abs(curvature):.2f} m is tighter than this robot can drive "
             f"({tightest_m(robot):.2f} m): ask for a wider arc, or for v = 0 to turn in place",
         )
-    yaw_radps = _YAW_RATE_FOR_THE_BEND * robot.limits.max_yaw_rate_radps
+    yaw_radps = YAW_RATE_FOR_THE_BEND * robot.limits.max_yaw_rate_radps
     top_mps = min(robot.limits.max_speed_mps, yaw_radps / max(abs(curvature), _STRAIGHT_1PM))
     return MotionRequest(Kind.ARC, min(v, top_mps), curvature)
 
