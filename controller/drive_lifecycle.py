@@ -20,8 +20,8 @@ ARM_TIMEOUT_S = 5.0
 REST_TIMEOUT_S = 6.0
 
 # Below these, measured speeds count as rest: the jitter of a coarse encoder, the noise of a gyro.
-REST_MPS = 0.02
-REST_RADPS = 0.05
+MEASURED_REST_MPS = 0.02
+MEASURED_REST_RADPS = 0.05
 
 
 class Outcome(Enum):
@@ -98,7 +98,8 @@ class DriveLifecycle:
         need not have reported anything.
         """
         trusted = not self._was_armed
-        slow = abs(state.v_mps) <= REST_MPS and abs(state.w_radps) <= REST_RADPS  # NaN is not
+        # NaN is no rest.
+        slow = abs(state.v_mps) <= MEASURED_REST_MPS and abs(state.w_radps) <= MEASURED_REST_RADPS
         if not (slow or trusted):
             self._resting_since_ns = None
             return False

@@ -35,9 +35,9 @@ from controller.record.tally import SetpointTally
 from controller.scenario_faults import with_slip_and_vibration
 from hal.clocks import NS_PER_S, SimulatedClock
 from hal.types import ChassisMode, PlanarPose
+from sim.plant import PLANT_REST_MPS
 from sim.simulation import Simulation
 
-_STANDING_MPS = 1e-3
 _NO_RECORDING = RecordingOptions(timed=False)
 
 
@@ -150,5 +150,5 @@ class _ProgressMonitor:
             dt_s = t_s - self._previous[0]
             travelled_m = math.hypot(pose.x_m - self._previous[1].x_m, pose.y_m - self._previous[1].y_m)
             self.v_mps = travelled_m / dt_s
-            self._standing_s = self._standing_s + dt_s if self.v_mps < _STANDING_MPS else 0.0
+            self._standing_s = self._standing_s + dt_s if self.v_mps < PLANT_REST_MPS else 0.0
         self._previous = (t_s, pose)

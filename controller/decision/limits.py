@@ -17,7 +17,7 @@ from hal.records import record
 
 # An obstacle still counts as ahead while the robot's front is past its near side by no more than this.
 ALONGSIDE_M = 0.1
-STANDING_MPS = 0.01
+STANDING_MPS = 0.01  # the decision counts a slower robot as standing, by command and by measurement
 BACKWARDS_MPS = -0.05  # a smaller backward speed is noise of the odometry
 # A body that moves away from the path goes along with the robot only if its speed along the path is more than
 # this many times its sideways speed. Otherwise it is leaving the path.

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.evaluation.eligibility import MOVING_MPS, STANDING_MPS
+from controller.evaluation.eligibility import MOVING_MPS, OBJECT_REST_MPS
 from controller.evaluation.endpoint_error import EndpointErrors, endpoint_errors
 from controller.evaluation.ours import Treadwatch
 from controller.evaluation.pixels import STEP_PX, claimed_levels, count_pixels
@@ -146,7 +146,7 @@ class _Recorder:
             excused=[
                 true_object.id
                 for true_object in objects
-                if true_object.turning or STANDING_MPS <= true_object.speed_mps < MOVING_MPS
+                if true_object.turning or OBJECT_REST_MPS <= true_object.speed_mps < MOVING_MPS
             ],
         )
 

@@ -19,8 +19,8 @@ from hal.types import PlanarPose
 # rounding does not make the path refuse it.
 _SPARE_RADIUS = 1.01
 # Slower requests count as standing: they are rounding errors of the planner or noise of encoders.
-STANDING_MPS = 0.005
-STANDING_RADPS = 0.005
+REQUESTED_REST_MPS = 0.005
+REQUESTED_REST_RADPS = 0.005
 # An arc with a radius of more than 10 km becomes a straight line (config.path.ArcSpec allows no larger one).
 _STRAIGHT_1PM = 1e-4
 # The path follows the arc for at most this angle, nearly half a turn.
@@ -74,11 +74,11 @@ def understand(twist: Twist, robot: Robot) -> MotionRequest:
     v, w = twist.v_mps, twist.w_radps
     if not (math.isfinite(v) and math.isfinite(w)):
         return MotionRequest(Kind.REFUSED, why=f"the command is not a number: {v} m/s, {w} rad/s")
-    if v < -STANDING_MPS:
+    if v < -REQUESTED_REST_MPS:
         why = f"reverse at {-v:.2f} m/s is refused: the camera does not see behind"
         return MotionRequest(Kind.REFUSED, why=why)
-    if v <= STANDING_MPS:
-        if abs(w) <= STANDING_RADPS:
+    if v <= REQUESTED_REST_MPS:
+        if abs(w) <= REQUESTED_REST_RADPS:
             return MotionRequest(Kind.STAND)
         yaw_radps = min(abs(w), robot.limits.max_yaw_rate_radps)
         return MotionRequest(Kind.TURN, yaw_radps * corner_m(robot), left=1 if w > 0.0 else -1)
@@ -112,7 +112,7 @@ def driveable(request: MotionRequest, v_mps: float, robot: Robot) -> MotionReque
     v_mps: the highest speed that the robot will still reach. If it is too fast for the requested arc, the
     robot slows down on the tightest arc that it can drive at that speed.
     """
-    most_1pm = robot.limits.max_yaw_rate_radps / max(v_mps, STANDING_MPS)
+    most_1pm = robot.limits.max_yaw_rate_radps / max(v_mps, REQUESTED_REST_MPS)
     if abs(request.curvature_1pm) <= most_1pm:
         return request
     return replace(request, curvature_1pm=math.copysign(most_1pm, request.curvature_1pm))
@@ -126,7 +126,7 @@ def arc_path(pose: PlanarPose, curvature_1pm: float, speed_mps: float, range_m: 
     """
     stop_m = braking.stop(robot.limits.max_speed_mps, 0.0, braking.comfort(robot.limits)).distance_m
     length_m = max(range_m, stop_m) + _BEYOND_M
-    most = max(min(speed_mps, 5.0), STANDING_MPS)
+    most = max(min(speed_mps, 5.0), REQUESTED_REST_MPS)
     start = StartSpec(x_m=pose.x_m, y_m=pose.y_m, heading_deg=math.degrees(pose.heading_rad))
     if abs(curvature_1pm) < _STRAIGHT_1PM:
         line = LineSpec(kind="line", length_m=length_m, max_speed_mps=most)

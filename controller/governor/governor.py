@@ -18,7 +18,7 @@ from controller.decision.camera_limits import condition_limit
 from controller.decision.decide import DecisionMaker
 from controller.decision.decision import Action, Decision, Reason
 from controller.decision.lens_cover import COVERED
-from controller.decision.limits import Limit, Motion, speed_to_decide_by
+from controller.decision.limits import STANDING_MPS, Limit, Motion, speed_to_decide_by
 from controller.decision.obstacle_boxes import bodies_of
 from controller.decision.situation import SceneError, Situation
 from controller.decision.surfaces import check_scan
@@ -36,7 +36,6 @@ from vision.scene import CameraCondition, Scene
 
 # The remembered floor stands in for the camera up to this far beyond the floor that is free by consent.
 _NEAR_EXTRA_M = 0.3
-_STANDING_MPS = 0.01
 _SAME_MPS = 1e-3  # speeds that differ by less count as equal
 
 
@@ -256,10 +255,10 @@ class SpeedGovernor:
         action = Action.KEEP
         if target_mps > v + band:
             action = Action.INCREASE
-        elif target_mps < v - band or (target_mps == 0.0 and v > _STANDING_MPS):
+        elif target_mps < v - band or (target_mps == 0.0 and v > STANDING_MPS):
             action = Action.DECREASE
         stuck_ns = decision.stuck_since_ns if reason is decision.reason else None
-        return Decision(action, target_mps, reason, emergency and v > _STANDING_MPS, stuck_ns)
+        return Decision(action, target_mps, reason, emergency and v > STANDING_MPS, stuck_ns)
 
     def _command(self, decision: Decision, cap: SpeedCap) -> Governed:
         turns = self._motion.kind is Kind.TURN

@@ -5,8 +5,8 @@ import pytest
 
 from controller.drive_lifecycle import (
     ARM_TIMEOUT_S,
-    REST_MPS,
-    REST_RADPS,
+    MEASURED_REST_MPS,
+    MEASURED_REST_RADPS,
     REST_TIMEOUT_S,
     SETTLE_S,
     DriveLifecycle,
@@ -79,7 +79,14 @@ def test_motion_in_between_begins_the_settling_anew() -> None:
 
 
 @pytest.mark.parametrize(
-    "told", [(1.1 * REST_MPS, 0.0), (-0.3, 0.0), (0.0, 1.1 * REST_RADPS), (0.0, -1.0), (math.nan, 0.0)]
+    "told",
+    [
+        (1.1 * MEASURED_REST_MPS, 0.0),
+        (-0.3, 0.0),
+        (0.0, 1.1 * MEASURED_REST_RADPS),
+        (0.0, -1.0),
+        (math.nan, 0.0),
+    ],
 )
 @pytest.mark.parametrize("arrived", [True, False])
 def test_a_base_that_still_moves_has_not_ended_the_drive(told: tuple[float, float], arrived: bool) -> None:
@@ -103,7 +110,8 @@ def test_feedback_from_before_the_stop_command_is_no_evidence_of_rest() -> None:
 def test_the_jitter_of_a_counter_is_rest() -> None:
     drive = Drive()
     drive.run(1.0, v_mps=0.5)
-    assert drive.run(1.0, arrived=True, told=(0.9 * REST_MPS, 0.9 * REST_RADPS)) is Outcome.REACHED
+    jitter = 0.9 * MEASURED_REST_MPS, 0.9 * MEASURED_REST_RADPS
+    assert drive.run(1.0, arrived=True, told=jitter) is Outcome.REACHED
 
 
 @pytest.mark.parametrize(
