@@ -166,6 +166,11 @@ def main() -> None:
     except Interrupted as error:
         _say(f"interrupted: {error}")
         sys.exit(INTERRUPTED)
+    except SystemError as error:
+        # Compiled steps call Python from C; Ctrl-C in there becomes the cause of a SystemError.
+        if isinstance(error.__cause__, KeyboardInterrupt):
+            raise KeyboardInterrupt from error
+        raise
     except (ConfigError, HalError, UserError) as error:
         _refuse(str(error))
 

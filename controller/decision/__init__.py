@@ -19,6 +19,7 @@ The files in the order of one control step:
 * lens_cover.py - whether something covers the lens
 * corridor.py - the swept width along the path, and bodies in path coordinates
 * sight.py - how far the corridor was seen free, and unexplained surfaces in it
+* held_surface.py - the nearest of these surfaces, also after it has left the view
 * blind_corners.py - where somebody may step out
 * limits.py - a speed limit with its reason
 * path_limit.py - top speed, sections and bends, the target

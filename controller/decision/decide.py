@@ -188,9 +188,10 @@ class DecisionMaker:
         if gated_mps >= raw_mps or self._last is None:
             return limiting
         held = self._last
+        waits = f"not faster than {gated_mps:.2f} m/s yet" if gated_mps > 0.0 else "not starting yet"
         return Reason(
             "release",
-            f"waiting to speed up; last limit: {held.sentence}",
+            f"{waits}; last limit: {held.sentence}",
             held.obstacle_id,
             limiting.distance_m,
             limiting.closing_mps,

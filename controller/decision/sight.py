@@ -9,7 +9,6 @@ limits.
 from __future__ import annotations
 
 import math
-from collections import deque
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +17,7 @@ from config.decision import DecisionConfig
 from controller.decision.blind_corners import BlindCorners, SurfacesOnPath
 from controller.decision.bodies import Bodies
 from controller.decision.corridor import Corridor
+from controller.decision.held_surface import SAME_SURFACE_M, HeldSurface
 from controller.decision.surfaces import Surfaces, seen_of
 from controller.decision.view_edges import MIN_TAN, assumed_free_m, may_be_above_view_within_m
 from hal.clocks import NS_PER_S
@@ -36,18 +36,11 @@ _LANES = 5  # points across the width of a cell
 _MAX_ABOVE_M = 3.0
 # Surfaces are looked for this much farther along the path than the range of sight.
 _BEYOND_RANGE_M = 2.0
-# The median of this many scenes counts: one outlier must not brake; three frames are a tenth of a second.
-_FRAMES = 5
-# A surface that recedes by more than this has left the view; less is depth noise.
-_RECEDES_M = 0.05
-_SAME_SURFACE_M = 0.3  # how much farther along the path points of the nearest surface may be
 
 
 class Sight:
     """Remembers what was seen of one path's corridor; call look() once a scene.
 
-    surface_s_m: path coordinate of the nearest unexplained surface in the corridor, filtered over some
-    scenes; inf: none.
     surface_clearance_m: free floor between that surface and the corridor; 0 or less: inside it.
     known_s_m: the corridor was seen free up to here.
     corners: the blind corners, where somebody could step out (controller/decision/blind_corners.py).
@@ -67,11 +60,15 @@ class Sight:
         self._near_m = self._floor_from_m = self._out_of_view_within_m = self._sight.near_m
         self._edges = math.nan, math.nan
         self._assumed_free_s_m = start_s_m + mount.forward_m + self._near_m + _CELL_M
-        self._nearest: deque[float] = deque(maxlen=_FRAMES)
-        self._held_s_m = self._closest_s_m = math.inf
-        self.surface_s_m = self.surface_clearance_m = math.inf
+        self._surface = HeldSurface()
+        self.surface_clearance_m = math.inf
         self.known_s_m = self._assumed_free_s_m
         self.corners = BlindCorners(config.sight)
+
+    @property
+    def surface_s_m(self) -> float:
+        """Path coordinate of the nearest unexplained surface in the corridor; inf: none."""
+        return self._surface.s_m
 
     def look(
         self,
@@ -103,7 +100,8 @@ class Sight:
         self.corners.look(on_path, stands, 2.0 * free.half_width_tan, s_m + self._corridor.front_m)
         if nearest_s < math.inf:
             self.surface_clearance_m = clearance_m
-        self._note_surface(nearest_s, s_m, standing)
+        blind_s_m = s_m + self._mount.forward_m + self._out_of_view_within_m
+        self._surface.note(nearest_s, s_m, blind_s_m, captured_ns, standing)
         self._note_floor(free, pose, s_m, captured_ns, in_corridor)
 
     def _on_path(self, surfaces: Surfaces, s_m: float) -> SurfacesOnPath:
@@ -131,21 +129,6 @@ class Sight:
         if free.up_tan < MIN_TAN:  # the upper edge hardly rises: where things leave it is not known
             above_m = min(above_m, _MAX_ABOVE_M)
         self._out_of_view_within_m = max(self._floor_from_m, above_m)
-
-    def _note_surface(self, nearest_s_m: float, s_m: float, standing: bool) -> None:
-        self._nearest.append(nearest_s_m)
-        steady = sorted(self._nearest)[len(self._nearest) // 2]
-        # A surface that leaves the view below, above or beside it because the robot drives on is still there,
-        # so it is held. A long wall beside the corridor leaves the view little by little: its nearest visible
-        # point recedes as fast as the robot drives. One that vanishes while the robot stands has gone away.
-        blind_s_m = s_m + self._mount.forward_m + self._out_of_view_within_m
-        if standing or self._held_s_m < s_m:
-            self._held_s_m = math.inf
-        elif steady > self._closest_s_m + _RECEDES_M and self._closest_s_m < blind_s_m:
-            self._held_s_m = min(self._held_s_m, self._closest_s_m)
-        keeps = not standing and s_m < self._closest_s_m < blind_s_m
-        self._closest_s_m = min(steady, self._closest_s_m) if keeps else steady
-        self.surface_s_m = min(steady, self._held_s_m)
 
     def _note_floor(
         self,
@@ -225,7 +208,7 @@ def _surfaces_in_corridor(
                 nearest_s = min(nearest_s, surface_s_m)
     for i in range(count):
         # A wall across the way begins beside it.
-        if counts[i] and on_path.s_m[i] <= nearest_s + _SAME_SURFACE_M:
+        if counts[i] and on_path.s_m[i] <= nearest_s + SAME_SURFACE_M:
             aside_m = abs(on_path.d_m[i]) - half_band_m[i]
             clearance_m = min(clearance_m, aside_m - on_path.half_width_m[i])
     return in_corridor, nearest_s, clearance_m, stands

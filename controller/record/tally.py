@@ -182,7 +182,7 @@ class FrameTally:
             return ""
         return (
             f"{self.processed} of the camera's {self.captured} were processed: perception did not keep up "
-            "(a video or a recording takes time from it), or the camera lost them"
+            "(a video, a recording, a simulated camera or other programs take time), or the camera lost them"
         )
 
 

@@ -118,6 +118,18 @@ def test_a_low_pallet_that_sinks_below_the_view_is_not_touched() -> None:
     assert log.clearance_m[-1] > 0.3
 
 
+@pytest.mark.parametrize("seen_by_edges", [True, False])
+@pytest.mark.parametrize("wide_m", [1.2, 3.0])
+def test_a_sill_below_the_view_is_not_forgotten_while_the_robot_stands_before_it(
+    wide_m: float, seen_by_edges: bool
+) -> None:
+    """It is below the view long before the robot comes to rest; too wide or too plain to be an obstacle."""
+    sill = Box(standing_at(8.0, 0.0), 0.2, wide_m, 0.15, seen_by_edges=seen_by_edges)
+    log = drive(Mission(straight(15.0), [sill], REAL), 40.0)
+    assert log.v_mps[-1] == 0.0
+    assert log.clearance_m[-1] > 0.3
+
+
 def test_a_plain_wall_is_stopped_before_by_depth_alone() -> None:
     wall = Box(standing_at(9.0, 0.0), 0.2, 5.0, 3.0, seen_by_edges=False)
     log = drive(Mission(straight(15.0), [wall], REAL), 20.0)

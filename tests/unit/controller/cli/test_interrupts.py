@@ -40,6 +40,27 @@ def test_before_a_command_can_make_more_of_it(
     assert capsys.readouterr().err.strip() == "treadwatch: interrupted"
 
 
+def test_inside_a_compiled_step(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """As CPython reports an exception that C code did not pass on."""
+
+    def interrupted(*_: object) -> int:
+        raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
+
+    monkeypatch.setattr(controller.mission.command, "run_mission", interrupted)
+    assert ended(monkeypatch, "run") == 130
+    assert capsys.readouterr().err.strip() == "treadwatch: interrupted"
+
+
+def test_other_system_errors_are_not_hidden(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*_: object) -> int:
+        raise SystemError("broken")
+
+    monkeypatch.setattr(controller.mission.command, "run_mission", broken)
+    monkeypatch.setattr(sys, "argv", ["treadwatch", "run"])
+    with pytest.raises(SystemError, match="broken"):
+        main()
+
+
 def test_while_the_program_is_still_being_imported(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

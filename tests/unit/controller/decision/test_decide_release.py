@@ -138,8 +138,11 @@ def test_held_back_it_says_by_what() -> None:
     decision = bench.step(bench.scene(), 1.0)
     assert decision.reason.rule == "release"
     assert decision.reason.obstacle_id == 5
-    told = "waiting to speed up; last limit: obstacle 5 stands on the path"
+    told = (
+        f"not faster than {decision.target_speed_mps:.2f} m/s yet; last limit: obstacle 5 stands on the path"
+    )
     assert decision.reason.sentence.startswith(told)
+    assert decision.target_speed_mps > 0.0
     assert decision.target_speed_mps < 1.5
 
 

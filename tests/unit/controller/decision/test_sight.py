@@ -134,8 +134,37 @@ def test_a_long_wall_within_the_margin_that_leaves_the_view_beside_it_is_still_t
         wall = np.where((BEARING > 0.0) & (ahead > 2.6 - s_m), ahead, math.inf)
         watch.look(free(wall), s_m=s_m)
     assert watch.sight.surface_s_m == pytest.approx(3.0, abs=0.2)
-    # While the robot stands only what is seen counts.
-    assert watch.look(free(wall), s_m=s_m, standing=True).surface_s_m > s_m + 1.2
+    # Nor does it go because the robot comes to rest beside it.
+    assert watch.look(free(wall), s_m=s_m, standing=True).surface_s_m == pytest.approx(3.0, abs=0.2)
+
+
+def to_rest_before_a_sill() -> Watch:
+    """A sill across the way, 3.4 m from the start: below the view from 0.9 m before the camera on."""
+    watch = Watch()
+    for step in range(130):
+        ahead_m = 3.0 - 0.02 * step
+        watch.look(free(ahead_m if ahead_m > 0.9 else math.inf), s_m=0.02 * step)
+    return watch
+
+
+def test_a_sill_that_sank_below_the_view_is_still_there_when_the_robot_stands() -> None:
+    watch = to_rest_before_a_sill()
+    assert watch.sight.surface_s_m == pytest.approx(3.4)
+    assert watch.look(free(), s_m=2.6, times=100, standing=True).surface_s_m == pytest.approx(3.4)
+    # Behind it something comes into the way and goes: the sill has not gone with it.
+    watch.look(free(2.0), s_m=2.6, times=10, standing=True)
+    assert watch.look(free(), s_m=2.6, times=100, standing=True).surface_s_m == pytest.approx(3.4)
+
+
+def test_a_held_surface_that_is_seen_while_the_robot_stands_and_then_goes_has_gone() -> None:
+    watch = to_rest_before_a_sill()
+    seen = watch.look(free(0.4), s_m=2.6, times=5, standing=True)
+    assert seen.surface_s_m == pytest.approx(3.4)
+    assert watch.look(free(), s_m=2.6, times=5, standing=True).surface_s_m == math.inf
+
+
+def test_a_sill_is_forgotten_once_the_robot_is_past_it() -> None:
+    assert to_rest_before_a_sill().look(free(), s_m=3.5).surface_s_m == math.inf
 
 
 def test_a_surface_that_goes_while_the_robot_stands_has_gone() -> None:
