@@ -178,7 +178,8 @@ def _on_line(
     return s_m, math.copysign(math.hypot(along - s_m, left), left)
 
 
-def _located(
+@inlined
+def located(
     path: Projection,
     points_m: FloatArray,
     velocity_mps: FloatArray,
@@ -186,7 +187,7 @@ def _located(
     from_s_m: float,
     to_s_m: float,
 ) -> FloatArray:
-    """As Projection.locate()."""
+    """As Projection.locate(), for compiled steps."""
     starts, xs, ys, headings, bends = path.chain
     end_m = starts[-1] + EXTENSION_M
     low_m = min(max(from_s_m, -EXTENSION_M), end_m - _SAMPLE_M)
@@ -209,6 +210,13 @@ def _located(
     return result
 
 
-# For compiled steps, and as a step of its own.
-located = inlined(_located)
-_locate = compiled(Projection, "float64[:, :], float64[:, :], float64[:], float64, float64")(_located)
+@compiled(Projection, "float64[:, :], float64[:, :], float64[:], float64, float64")
+def _locate(
+    path: Projection,
+    points_m: FloatArray,
+    velocity_mps: FloatArray,
+    times_s: FloatArray,
+    from_s_m: float,
+    to_s_m: float,
+) -> FloatArray:
+    return located(path, points_m, velocity_mps, times_s, from_s_m, to_s_m)
