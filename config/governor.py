@@ -25,7 +25,11 @@ class UnixInputConfig(Section):
     group_may_command, can send."""
 
     kind: Literal["unix"]
-    path: str = Field(min_length=1, max_length=100, description="of the socket; made, and removed at the end")
+    path: str = Field(
+        min_length=1,
+        max_length=100,
+        description="of the socket, relative to this file; made, and removed at the end",
+    )
     group_may_command: bool = False
 
     @field_validator("path")

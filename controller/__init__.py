@@ -9,10 +9,11 @@ The files and folders in the order in which they come into play:
 * lockstep.py, realtime/ - the loops: when a frame is looked at, and when the control steps
 * perceive.py - a frame through vision/
 * control.py - one control step, through all files from here to guard.py
-* driven_base.py - the chassis with its pose and its answer; ending.py: how a drive begins and ends
+* driven_base.py - the chassis with its pose and its response; drive_lifecycle.py - how a drive begins
+  and ends
 * localise.py - where the robot is; contradiction.py - when the images overrule the odometry
 * decision/ - how fast it may go, and why
-* answer.py - whether the base does what it is told
+* response_monitor.py - whether the base does what it is told
 * shape.py - the jerk-limited setpoint; chassis_lag.py - how much later the base follows
 * braking.py, profile.py - formulas of stops and of speed profiles, for decision and shape
 * follow.py - the yaw rate that keeps it on the path

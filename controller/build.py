@@ -26,7 +26,6 @@ from config.loader import resolve
 from config.path import LineSpec, PathSpec
 from config.robot import Robot
 from config.scenario import Scenario, load_scenario
-from controller.answer import BaseAnswer
 from controller.control import ControlLoop, Decides
 from controller.decision.decide import DecisionMaker
 from controller.follow import PathFollower
@@ -34,6 +33,7 @@ from controller.localise import Localiser
 from controller.path.path import Path, PathError
 from controller.perceive import Perceiver
 from controller.record.recorder import Surroundings
+from controller.response_monitor import ResponseMonitor
 from controller.shape import SpeedShaper
 from hal.api import Chassis, Clock, DatagramLink, FrameSource, OdometrySource
 from hal.cameras.bag_file import is_bag
@@ -134,7 +134,7 @@ def build_control_loop(config: AppConfig, path: Path, decide: Decides, chassis: 
         follow=PathFollower(path, limits, delay_s),
         localiser=Localiser(path.start, mount_of(config.robot)),
         chassis=chassis,
-        answer=BaseAnswer(delay_s, limits.max_speed_mps),
+        response=ResponseMonitor(delay_s, limits.max_speed_mps),
     )
 
 
@@ -244,13 +244,13 @@ def _fps(config: AppConfig) -> float:
     return REPLAY_FPS if isinstance(config.camera, ReplayCameraConfig) else float(config.camera.fps)
 
 
-def open_commands(config: InputConfig) -> DatagramLink:
+def open_commands(config: InputConfig, config_path: FilePath) -> DatagramLink:
     """The socket at which a governor's commands arrive, not yet entered."""
     match config:
         case UdpInputConfig():
             return UdpSocket(config.host, config.port)
         case UnixInputConfig():
-            return UnixSocket(FilePath(config.path).expanduser(), config.group_may_command)
+            return UnixSocket(resolve(config.path, config_path), config.group_may_command)
         case unknown:
             assert_never(unknown)
 

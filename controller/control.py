@@ -10,15 +10,15 @@ import math
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from controller.answer import BaseAnswer
 from controller.decision.decision import Decision
 from controller.decision.limits import speed_to_decide_by
 from controller.decision.situation import Situation
-from controller.driven_base import DrivenBase
-from controller.ending import Ending, Outcome
+from controller.drive_lifecycle import Outcome
+from controller.driven_base import DriveLoop, DrivenBase
 from controller.follow import PathFollower
 from controller.localise import Localiser
 from controller.path.path import OnPath, Path
+from controller.response_monitor import ResponseMonitor, SpeedCap
 from controller.shape import SpeedShaper
 from hal.api import Chassis
 from hal.types import ChassisState, FloatArray, PlanarPose, Setpoint
@@ -75,7 +75,7 @@ class Decides(Protocol):
     def step(self, at: Situation) -> Decision: ...
 
 
-class ControlLoop:
+class ControlLoop(DriveLoop):
     """One control period along a path: steps every part in its order; none of them runs by itself."""
 
     def __init__(
@@ -86,33 +86,18 @@ class ControlLoop:
         follow: PathFollower,
         localiser: Localiser,
         chassis: Chassis,
-        answer: BaseAnswer,
+        response: ResponseMonitor,
     ) -> None:
+        super().__init__(DrivenBase(chassis, localiser, response))
         self.path = path
-        self.localiser = localiser
         self._decide = decide
         self._shape = shape
         self._follow = follow
-        self._base = DrivenBase(chassis, localiser, answer)
         self._progress_m = 0.0
 
-    @property
-    def ending(self) -> Ending:
-        """Whether, how and why the drive has ended."""
-        return self._base.ending
-
-    @property
-    def finished(self) -> bool:
-        """Whether the drive has ended; then the chassis has been told to stop."""
-        return self._base.finished
-
-    def request_stop(self, reason: str, outcome: Outcome = Outcome.STOPPED) -> None:
-        """Stop by the comfort profile, then end with this outcome. The first reason is kept."""
-        self.ending.request_stop(reason, outcome)
-
     def step(self, scene: Scene | None, now_ns: int) -> ControlStep:
-        """Decide on what is known, shape, send, and take in what the chassis answers."""
-        self._base.begin(scene, now_ns)
+        """Decide on what is known, shape, send, and take in what the chassis returns."""
+        cap = self._base.begin_step(scene, now_ns)
         pose = self.localiser.pose
         on_path = self.path.project(pose, self._progress_m)
         if math.isfinite(on_path.s_m):
@@ -121,35 +106,36 @@ class ControlLoop:
         decision = self._decide.step(
             Situation(scene, self.path, pose, on_path, speed_mps, self._shape.a_mps2, now_ns)
         )
-        setpoint, fault, unanswered = self._setpoint(decision, on_path, now_ns)
-        state = self._base.exchange(setpoint, now_ns, zero=unanswered != "")
+        setpoint, fault, unanswered = self._setpoint(decision, on_path, cap, now_ns)
         to_go_m = self.path.length_m - on_path.s_m
         if to_go_m < -PASSED_M:
             self.request_stop("went past the target", Outcome.BROKEN_OFF)
-        self._base.conclude(setpoint, now_ns, arrived=-PASSED_M <= to_go_m <= ARRIVED_M)
+        arrived = -PASSED_M <= to_go_m <= ARRIVED_M
+        state = self._base.finish_step(setpoint, now_ns, zero=unanswered != "", arrived=arrived)
         scene_ns = None if scene is None else scene.captured_ns
         return ControlStep(
             now_ns, pose, on_path.s_m, on_path.d_m, scene_ns, decision, setpoint, state,
             fault=fault, unanswered=unanswered,
         )  # fmt: skip
 
-    def _setpoint(self, decision: Decision, on_path: OnPath, now_ns: int) -> tuple[Setpoint, str, str]:
+    def _setpoint(
+        self, decision: Decision, on_path: OnPath, cap: SpeedCap, now_ns: int
+    ) -> tuple[Setpoint, str, str]:
         """What to send, the shaper's fault, and why zero is asked for instead of the profile."""
         stand = Setpoint(now_ns, 0.0, 0.0, 0.0)
-        answer = self._base.answer(self._shape.v_mps, now_ns)
         if not self._base.obeys:
             # The chassis does not follow setpoints now. When it does again, shaping begins from standstill.
             self._shape.reset()
             return stand, "", ""
-        if answer.zero:
+        if cap.zero_reason:
             self._shape.begin_anew()
-            return stand, "", answer.zero
-        if answer.dips:
+            return stand, "", cap.zero_reason
+        if cap.dips:
             self._shape.unlearn_lag()
-        target_mps = 0.0 if self.ending.stop_reason is not None else decision.target_speed_mps
+        target_mps = 0.0 if self.lifecycle.stop_reason is not None else decision.target_speed_mps
         shaped = self._shape.step(
-            min(target_mps, answer.cap_mps),
-            emergency=decision.emergency or answer.hard or self.localiser.contradiction != "",
+            min(target_mps, cap.cap_mps),
+            emergency=decision.emergency or cap.hard,
             distance_to_end_m=self.path.length_m - self._progress_m,
         )
         w_radps = self._follow.step(on_path, shaped.v_mps)

@@ -1,38 +1,35 @@
 """The base as a control loop drives it: what the loop along a path and the governor's do alike in each step.
 
-Each step calls begin(), answer(), exchange() and conclude(), in this order.
+Each step calls begin_step(), decides what to command, and calls finish_step().
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
-from controller.answer import ANSWERS, Answer, BaseAnswer
-from controller.ending import Ending, Outcome
+from controller.drive_lifecycle import DriveLifecycle, Outcome
 from controller.localise import Localiser
+from controller.response_monitor import NO_CAP, ResponseMonitor, SpeedCap
 from hal.api import Chassis
 from hal.types import ChassisMode, ChassisState, Setpoint
 from vision.scene import Scene
 
 
 class DrivenBase:
-    """A chassis, with where it is, whether it answers its commands, and how its drive begins and ends.
+    """A chassis, with where it is, whether it responds to its commands, and how its drive begins and ends.
 
     state: what the chassis told last; None before the first exchange.
     """
 
-    def __init__(self, chassis: Chassis, localiser: Localiser, answer: BaseAnswer) -> None:
+    def __init__(self, chassis: Chassis, localiser: Localiser, response: ResponseMonitor) -> None:
         self.localiser = localiser
-        self.ending = Ending(chassis)
+        self.lifecycle = DriveLifecycle(chassis)
         self.state: ChassisState | None = None
         self._chassis = chassis
-        self._answer = answer
+        self._response = response
         self._scene_ns: int | None = None
-
-    @property
-    def finished(self) -> bool:
-        """Whether the drive has ended; then the chassis has been told to stop."""
-        return self.ending.outcome is not None
+        self._commanded_mps = 0.0
 
     @property
     def obeys(self) -> bool:
@@ -44,41 +41,69 @@ class DrivenBase:
         """The measured speed; NaN if it is not known."""
         return math.nan if self.state is None else self.state.v_mps
 
-    def begin(self, scene: Scene | None, now_ns: int) -> None:
-        """Arm the chassis in the first step, and correct the pose by the ego-motion of a new scene.
+    def begin_step(self, scene: Scene | None, now_ns: int) -> SpeedCap:
+        """Arm the chassis in the first step, correct the pose by a new scene, and judge the base's response.
 
-        Where the images contradict the odometry for long, a stop is requested.
+        The response is the measured speed after the command of the step before. A stop is requested where
+        nothing helps, and where the images contradict the odometry for long. Then every command is a hard
+        one, because the base may go anywhere.
         """
-        self.ending.begin(now_ns)
+        self.lifecycle.arm_once(now_ns)
         if scene is not None and scene.captured_ns != self._scene_ns:
             self._scene_ns = scene.captured_ns
             self.localiser.add_ego_motion(scene.captured_ns, scene.ego_motion)
             if self.localiser.contradiction:
-                self.ending.request_stop(self.localiser.contradiction, Outcome.BROKEN_OFF)
+                self.lifecycle.request_stop(self.localiser.contradiction, Outcome.BROKEN_OFF)
+        cap = self._judge_response(now_ns)
+        return replace(cap, hard=True) if self.localiser.contradiction else cap
 
-    def answer(self, commanded_mps: float, now_ns: int) -> Answer:
-        """Whether the base does what it was told; requests a stop where nothing helps.
-
-        commanded_mps: the last command. While the chassis does not obey, what it does is no answer.
-        """
-        if self.state is None or not self.obeys:
-            self._answer.restart()
-            return ANSWERS
-        answer = self._answer.step(commanded_mps, self.state.v_mps, self.state.feedback_ns, now_ns)
-        if answer.ends:
-            self.ending.request_stop(answer.zero, Outcome.BROKEN_OFF)
-        return answer
-
-    def exchange(self, setpoint: Setpoint, now_ns: int, *, zero: bool) -> ChassisState:
-        """Send the setpoint, and take in the state and the odometry that come back.
+    def finish_step(
+        self, setpoint: Setpoint, now_ns: int, *, zero: bool = False, arrived: bool = False
+    ) -> ChassisState:
+        """Send the setpoint, take in state and odometry that come back, and end the drive if it is over.
 
         zero: ask for zero at once instead; as a setpoint it would be a step that the output guard refuses.
+        arrived: whether the robot is where this drive leads to.
         """
-        self.state = self._chassis.exchange(None if zero else setpoint, now_ns)
-        self.localiser.add_odometry(self.state.stamp_ns, self.state.pose)
-        return self.state
+        self.state = state = self._chassis.exchange(None if zero else setpoint, now_ns)
+        self._commanded_mps = setpoint.v_mps
+        self.localiser.add_odometry(state.stamp_ns, state.pose)
+        self.lifecycle.check_end(state, setpoint, now_ns, arrived=arrived)
+        return state
 
-    def conclude(self, setpoint: Setpoint, now_ns: int, *, arrived: bool) -> None:
-        """Decide whether the drive is over. arrived: whether the robot is where this drive leads to."""
-        assert self.state is not None, "concluded before the first exchange"
-        self.ending.conclude(self.state, setpoint, now_ns, arrived=arrived)
+    def _judge_response(self, now_ns: int) -> SpeedCap:
+        """While the chassis does not obey, what it does is no response."""
+        if self.state is None or not self.obeys:
+            self._response.restart()
+            return NO_CAP
+        state = self.state
+        cap = self._response.step(self._commanded_mps, state.v_mps, state.feedback_ns, now_ns)
+        if cap.ends:
+            self.lifecycle.request_stop(cap.zero_reason, Outcome.BROKEN_OFF)
+        return cap
+
+
+class DriveLoop:
+    """What both control loops show of their base and of their drive."""
+
+    def __init__(self, base: DrivenBase) -> None:
+        self._base = base
+
+    @property
+    def localiser(self) -> Localiser:
+        """Where the robot is."""
+        return self._base.localiser
+
+    @property
+    def lifecycle(self) -> DriveLifecycle:
+        """Whether, how and why the drive has ended."""
+        return self._base.lifecycle
+
+    @property
+    def finished(self) -> bool:
+        """Whether the drive has ended; then the chassis has been told to stop."""
+        return self.lifecycle.outcome is not None
+
+    def request_stop(self, reason: str, outcome: Outcome = Outcome.STOPPED) -> None:
+        """Stop by the comfort profile, then end with this outcome. The first reason is kept."""
+        self.lifecycle.request_stop(reason, outcome)

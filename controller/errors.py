@@ -12,3 +12,8 @@ class Interrupted(Exception):
 
 class UserError(Exception):
     """A request that cannot be fulfilled: one line with what, where, why and what to do."""
+
+
+def describe(error: BaseException) -> str:
+    """Type and text of an unforeseen error in one line; the text of OpenCV has several lines."""
+    return f"{type(error).__name__}: {' '.join(str(error).split())[:300]}".rstrip(": ")

@@ -16,7 +16,7 @@ from controller.decision.limits import Motion
 from hal.compiled import compiled, inlined
 from hal.types import FloatArray
 
-_STANDING_MPS = 1e-9
+_ROUNDED_TO_REST_MPS = 1e-9  # what rounding leaves of a speed at the end of a stop
 
 
 class SpeedRamps:
@@ -92,7 +92,7 @@ def stop_step(v_mps: float, a_mps2: float, limits: BrakeLimits, dt_s: float) -> 
     )
     _, speed, acceleration = ramp.state(np.full((1, 1), dt_s))
     v, a = float(speed[0, 0]), float(acceleration[0, 0])
-    return (v, a) if v > _STANDING_MPS else (0.0, 0.0)
+    return (v, a) if v > _ROUNDED_TO_REST_MPS else (0.0, 0.0)
 
 
 @inlined

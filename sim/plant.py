@@ -13,6 +13,9 @@ from hal.types import PlanarPose
 
 # Substep: 1 mm of travel at 1 m/s. Within it, speeds follow the exact exponential of the lag.
 _STEP_NS = 1_000_000
+# A slower base stands: the speed of a track nears its target exponentially and never gets there.
+PLANT_REST_MPS = 1e-3
+PLANT_REST_RADPS = 1e-3
 
 
 @dataclass(slots=True)

@@ -134,7 +134,9 @@ def measure_period(priority: int, seconds: float) -> PeriodFigures:
     start_ns = commanded_ns[0] + round(_SETTLE_S * NS_PER_S) if commanded_ns else 0
     counted_ns = [stamp_ns for stamp_ns in commanded_ns if 0 <= stamp_ns - start_ns <= seconds * NS_PER_S]
     if len(counted_ns) < 0.5 * seconds * NS_PER_S / PERIOD_NS:
-        raise UserError(f"only {len(counted_ns)} commands in {seconds:g} s: {result.loop.ending.stop_reason}")
+        raise UserError(
+            f"only {len(counted_ns)} commands in {seconds:g} s: {result.loop.lifecycle.stop_reason}"
+        )
     return PeriodFigures.of(counted_ns)
 
 

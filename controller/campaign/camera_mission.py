@@ -27,7 +27,7 @@ from controller.campaign.drive_log import DriveLog
 from controller.campaign.noise_mission import GIVE_UP_S
 from controller.campaign.policies import build_policy
 from controller.campaign.stage import Stage
-from controller.ending import SETTLE_S, Outcome
+from controller.drive_lifecycle import SETTLE_S, Outcome
 from controller.errors import UserError
 from controller.lockstep import run_lockstep
 from controller.record.recorder import RecordingOptions, RunRecorder, open_recorder
@@ -35,9 +35,9 @@ from controller.record.tally import SetpointTally
 from controller.scenario_faults import with_slip_and_vibration
 from hal.clocks import NS_PER_S, SimulatedClock
 from hal.types import ChassisMode, PlanarPose
+from sim.plant import PLANT_REST_MPS
 from sim.simulation import Simulation
 
-_STANDING_MPS = 1e-3
 _NO_RECORDING = RecordingOptions(timed=False)
 
 
@@ -106,7 +106,7 @@ def _drive(
             if monitor.given_up:
                 break
         recorder.finish()
-    if loop.ending.outcome is Outcome.REACHED:
+    if loop.lifecycle.outcome is Outcome.REACHED:
         log.reached_s = log.times_s[-1] - SETTLE_S - monitor.armed_s
     return log
 
@@ -150,5 +150,5 @@ class _ProgressMonitor:
             dt_s = t_s - self._previous[0]
             travelled_m = math.hypot(pose.x_m - self._previous[1].x_m, pose.y_m - self._previous[1].y_m)
             self.v_mps = travelled_m / dt_s
-            self._standing_s = self._standing_s + dt_s if self.v_mps < _STANDING_MPS else 0.0
+            self._standing_s = self._standing_s + dt_s if self.v_mps < PLANT_REST_MPS else 0.0
         self._previous = (t_s, pose)

@@ -26,12 +26,11 @@ from controller.shape import SpeedShaper
 from hal.clocks import NS_PER_S
 from hal.compiled import compiled
 from hal.types import FloatArray, PlanarPose, Setpoint
-from sim.plant import Track
+from sim.plant import PLANT_REST_MPS, Track
 from vision.scene import CameraCondition, CameraHealth, Scene
 
 # If the robot still stands this long after everything else has come to rest, it will stand for ever.
 GIVE_UP_S = 6.0
-_STANDING_MPS = 1e-3
 _OFFSET_SIGMA_M = 0.01
 _OFFSET_TIME_CONSTANT_S = 2.0
 _ODOMETRY_SIGMA = 0.003
@@ -183,7 +182,7 @@ class _NoiseDrive:
 
     def _is_over(self, t_s: float) -> bool:
         """Whether the robot is at rest, and on the target, stopped for good, or given up."""
-        if self._base.speed_mps >= _STANDING_MPS:
+        if self._base.speed_mps >= PLANT_REST_MPS:
             self._standing_s = 0.0
             return False
         self._standing_s += self._dt_s

@@ -70,11 +70,11 @@ class DecisionMaker:
         self._stuck_since_ns: int | None = None
         self._last: Reason | None = None
 
-    def take_path(self, path: Path, known: WorldModel) -> None:
+    def continue_along(self, path: Path, known: WorldModel) -> None:
         """Continue along another path, of which known is known already; the hysteresis is kept."""
         self._path, self._known = path, known
 
-    def world_model(self, path: Path, start_s_m: float) -> WorldModel:
+    def new_world_model(self, path: Path, start_s_m: float) -> WorldModel:
         """A new WorldModel of a path of which nothing is known yet, for a robot that stands at start_s_m."""
         return WorldModel(path, self._robot, self._mount, self._config, start_s_m, self._noise)
 
@@ -85,7 +85,7 @@ class DecisionMaker:
         if fault:
             return self._halt(fault, at.v_mps, at.now_ns)
         path, on_path, v_mps, now_ns = at.path, at.on_path, max(at.v_mps, 0.0), at.now_ns
-        known = self._world_model(path, on_path)
+        known = self._model_of(path, on_path)
         known.update(at.scene, at.pose, on_path, v_mps, now_ns)
         if not known.has_seen:
             # The release gate is not stepped: the first scene with a free way lets the robot go at once.
@@ -123,31 +123,19 @@ class DecisionMaker:
         action = Action.DECREASE if abs(v) > STANDING_MPS else Action.KEEP
         return Decision(action, 0.0, reason, self._emergency)
 
-    def _world_model(self, path: Path, on_path: OnPath) -> WorldModel:
+    def _model_of(self, path: Path, on_path: OnPath) -> WorldModel:
+        """What is known along this path: a new model if it is another path than before."""
         if self._known is None or path is not self._path:
-            self._path = path
-            self._known = self.world_model(path, on_path.s_m)
+            self.continue_along(path, self.new_world_model(path, on_path.s_m))
+        assert self._known is not None
         return self._known
 
     def _conclude(self, on_way: Limit, limits: list[Limit], motion: Motion, now_ns: int) -> Decision:
-        top_mps = self._robot.limits.max_speed_mps
         least = _least(limits)
         raw_mps = self._start_or_creep(least, motion)
-        blocked = raw_mps <= 0.0
-        waits = self._start_delay.step(blocked, blocked and least.reason.rule in STANDING_RULES, now_ns)
-        limited: Reason | None = None
-        let_go_mps = max(motion.v_mps - motion.a_mps2**2 / (2.0 * self._comfort.jerk_mps3), 0.0)
-        if raw_mps < min(top_mps, on_way.speed_mps):
-            self._last = limited = _reason_for(least, raw_mps)
-        # Something that comes and goes does not stop a robot that still rolls, but lets it get no faster.
-        rolling_mps = let_go_mps if let_go_mps >= self._config.release.creep_mps else 0.0
-        released_mps = min(raw_mps, rolling_mps if waits else top_mps)
-        gated_mps = self._gate.step(released_mps, motion.v_mps, let_go_mps, now_ns, on_way.speed_mps)
+        gated_mps = self._gated_mps(raw_mps, least, on_way, motion, now_ns)
         target_mps = min(gated_mps, on_way.speed_mps)
-        if on_way.speed_mps <= gated_mps:
-            reason = on_way.reason
-        else:
-            reason = self._reason(limited or _reason_for(least, raw_mps), raw_mps, gated_mps)
+        reason = self._reason(raw_mps, gated_mps, least, on_way)
         self._emergency = self._brakes_hard(limits, min(raw_mps, on_way.speed_mps), motion)
         self._note_stuck(target_mps, motion, reason, now_ns)
         action = self._action(target_mps, motion.v_mps)
@@ -156,6 +144,16 @@ class DecisionMaker:
             # The shaper is braking for the target: a speed that is higher only by the slack is no increase.
             action = Action.KEEP
         return Decision(action, target_mps, reason, self._emergency, self._stuck_since_ns)
+
+    def _gated_mps(self, raw_mps: float, least: Limit, on_way: Limit, motion: Motion, now_ns: int) -> float:
+        """What start delay and release gate pass on of raw_mps, the speed that least allows now."""
+        blocked = raw_mps <= 0.0
+        waits = self._start_delay.step(blocked, blocked and least.reason.rule in STANDING_RULES, now_ns)
+        let_go_mps = max(motion.v_mps - motion.a_mps2**2 / (2.0 * self._comfort.jerk_mps3), 0.0)
+        # Something that comes and goes does not stop a robot that still rolls, but lets it get no faster.
+        rolling_mps = let_go_mps if let_go_mps >= self._config.release.creep_mps else 0.0
+        released_mps = min(raw_mps, rolling_mps if waits else self._robot.limits.max_speed_mps)
+        return self._gate.step(released_mps, motion.v_mps, let_go_mps, now_ns, on_way.speed_mps)
 
     def _start_or_creep(self, limit: Limit, motion: Motion) -> float:
         """The limit's speed, or 0 if it is too low to go for and something blocks the way.
@@ -175,12 +173,18 @@ class DecisionMaker:
             least = min(least, max(release.creep_mps, self._config.prediction.beside_mps))
         return limit.speed_mps if limit.speed_mps >= least else 0.0
 
-    def _reason(self, limiting: Reason, raw_mps: float, gated_mps: float) -> Reason:
-        """The reason for a target below what the path allows.
+    def _reason(self, raw_mps: float, gated_mps: float, least: Limit, on_way: Limit) -> Reason:
+        """The reason for the target, which is gated_mps or what the path allows.
 
-        limiting: reason of the least limit. While the release gate holds the target back, the reason is the
-        last thing that limited it.
+        While the release gate holds the target back, the reason is the last thing that limited it. That is
+        noted here.
         """
+        limiting: Reason | None = None
+        if raw_mps < min(self._robot.limits.max_speed_mps, on_way.speed_mps):
+            self._last = limiting = _reason_for(least, raw_mps)
+        if on_way.speed_mps <= gated_mps:
+            return on_way.reason
+        limiting = limiting or _reason_for(least, raw_mps)
         if gated_mps >= raw_mps or self._last is None:
             return limiting
         held = self._last

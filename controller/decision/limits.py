@@ -17,7 +17,7 @@ from hal.records import record
 
 # An obstacle still counts as ahead while the robot's front is past its near side by no more than this.
 ALONGSIDE_M = 0.1
-STANDING_MPS = 0.01
+STANDING_MPS = 0.01  # the decision counts a slower robot as standing, by command and by measurement
 BACKWARDS_MPS = -0.05  # a smaller backward speed is noise of the odometry
 # A body that moves away from the path goes along with the robot only if its speed along the path is more than
 # this many times its sideways speed. Otherwise it is leaving the path.
@@ -89,6 +89,57 @@ class Gap:
         return f"obstacle {self.obstacle_id}{unseen}"
 
 
+@record(frozen=True, slots=True)
+class StoppingRoom:
+    """The room for a comfortable stop a margin before the end of a gap.
+
+    speed_mps: greatest speed from which that stop still fits.
+    required_m: what it takes at the present motion, the margin included.
+    spare_m: what it leaves of the gap; negative if it takes more.
+    """
+
+    speed_mps: float
+    required_m: float
+    spare_m: float
+
+
+def stopping_room(gap: Gap, motion: Motion, comfort: BrakeLimits, margin_m: float) -> StoppingRoom:
+    """The room for a comfortable stop margin_m before the end of the gap."""
+    room_m = gap.distance_m + gap.leader_stop_m
+    speed_mps = braking.speed_for_distance(
+        room_m,
+        comfort,
+        latency_s=motion.latency_s,
+        closing_mps=gap.closing_mps,
+        margin_m=margin_m,
+        # A present acceleration lowers the limit; a present deceleration must not raise it.
+        a_mps2=max(motion.a_mps2, 0.0),
+    )
+    required_m = braking.required_distance(
+        motion.v_mps, motion.a_mps2, gap.closing_mps, motion.latency_s, comfort, margin_m
+    )
+    return StoppingRoom(speed_mps, required_m, room_m - required_m)
+
+
+def reason_before(gap: Gap, room: StoppingRoom, rule: Rule, what: str) -> Reason:
+    """The reason to stop before the end of the gap. what: completes "obstacle 3 ... 2.0 m ahead"."""
+    ahead = f"{gap.name} {what} {max(gap.distance_m, 0.0):.1f} m ahead: "
+    return Reason(
+        rule,
+        ahead + allowed_text(room.speed_mps),
+        gap.obstacle_id,
+        gap.distance_m,
+        gap.closing_mps,
+        room.required_m,
+        room.spare_m,
+    )
+
+
+def too_little_left(room: StoppingRoom, motion: Motion, margin_m: float, min_left_m: float) -> bool:
+    """Whether a stop with this margin would leave less than min_left_m, so that it has to be a harder one."""
+    return motion.v_mps > 0.0 and room.spare_m < min_left_m - margin_m
+
+
 def stop_before(
     gap: Gap,
     motion: Motion,
@@ -98,31 +149,13 @@ def stop_before(
     rule: Rule,
     what: str,
 ) -> Limit:
-    """The limit for a comfortable stop margin_m before the end of the gap.
+    """The limit for a comfortable stop margin_m before the end of the gap, with a reason_before() it.
 
-    It is urgent if that stop would leave less than min_left_m. rule, what: for the reason; what completes the
-    sentence "obstacle 3 ... 2.0 m ahead".
+    It is urgent if that stop would leave less than min_left_m.
     """
-    room_m = gap.distance_m + gap.leader_stop_m
-    speed = braking.speed_for_distance(
-        room_m,
-        comfort,
-        latency_s=motion.latency_s,
-        closing_mps=gap.closing_mps,
-        margin_m=margin_m,
-        # A present acceleration lowers the limit; a present deceleration must not raise it.
-        a_mps2=max(motion.a_mps2, 0.0),
-    )
-    required = braking.required_distance(
-        motion.v_mps, motion.a_mps2, gap.closing_mps, motion.latency_s, comfort, margin_m
-    )
-    spare = room_m - required
-
-    def why() -> Reason:
-        sentence = f"{gap.name} {what} {max(gap.distance_m, 0.0):.1f} m ahead: {allowed_text(speed)}"
-        return Reason(rule, sentence, gap.obstacle_id, gap.distance_m, gap.closing_mps, required, spare)
-
-    return Limit(speed, why, urgent=motion.v_mps > 0.0 and spare < min_left_m - margin_m)
+    room = stopping_room(gap, motion, comfort, margin_m)
+    urgent = too_little_left(room, motion, margin_m, min_left_m)
+    return Limit(room.speed_mps, lambda: reason_before(gap, room, rule, what), urgent)
 
 
 def standing_text(clearance_m: float, needed_m: float) -> str:

@@ -27,7 +27,7 @@ from hal.compiled import compiled
 from hal.records import record
 from hal.types import FlagMatrix, FloatArray, Matrix
 
-_STANDING_MPS = 0.02
+_STOPPED_MPS = 0.02  # at the end of a stop, a slower robot counts as one that has stopped
 
 
 @record(frozen=True, slots=True, eq=False)
@@ -72,7 +72,7 @@ class Stops:
 def stops(ramps: SpeedRamps, times_s: FloatArray) -> Stops:
     """Sample the R stops at times_s (K,); ramps: R ramps to speed 0."""
     distance, speed, _ = ramps.state(times_s[None, :])
-    return Stops(distance, speed > _STANDING_MPS)
+    return Stops(distance, speed > _STOPPED_MPS)
 
 
 def count_safe_stops(stopping: Stops, s_m: float, reached: Reach, counts: NDArray[np.bool_]) -> int:

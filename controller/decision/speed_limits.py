@@ -21,6 +21,7 @@ Words for the bodies that controller/decision/world_model.py knows:
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -32,7 +33,16 @@ from controller.decision.bodies import Bodies
 from controller.decision.corridor import place
 from controller.decision.decision import Reason
 from controller.decision.lens_cover import COVERED
-from controller.decision.limits import Gap, Limit, Motion, allowed_text, standing_text, stop_before
+from controller.decision.limits import (
+    Gap,
+    Limit,
+    Motion,
+    allowed_text,
+    reason_before,
+    standing_text,
+    stopping_room,
+    too_little_left,
+)
 from controller.decision.moving_limits import MovingLimits
 from controller.decision.standing_limits import StandingLimits
 from controller.decision.watched import Watch
@@ -110,36 +120,31 @@ class SpeedLimits:
 
         Which obstacle it belongs to is looked up for the sentence only.
         """
-        margins, ahead_m = self._config.margins, surface_s_m - (s_m + known.corridor.front_m)
-
-        what = standing_text(known.sight.surface_clearance_m, margins.lateral_m)
-
-        def before(gap: Gap) -> Limit:
-            return stop_before(gap, motion, self._comfort, margins.stop_m, margins.least_m, "depth", what)
+        margins, gap = self._config.margins, Gap(surface_s_m - (s_m + known.corridor.front_m))
+        room = stopping_room(gap, motion, self._comfort, margins.stop_m)
 
         def why() -> Reason:
-            return before(Gap(ahead_m, obstacle_id=_owner(known, surface_s_m, s_m))).reason
+            owned = replace(gap, obstacle_id=_owner(known, surface_s_m, s_m))
+            what = standing_text(known.sight.surface_clearance_m, margins.lateral_m)
+            return reason_before(owned, room, "depth", what)
 
-        limit = before(Gap(ahead_m))
-        return Limit(limit.speed_mps, why, limit.urgent)
+        return Limit(room.speed_mps, why, too_little_left(room, motion, margins.stop_m, margins.least_m))
 
     def _unseen(self, gap: Gap, motion: Motion) -> Limit:
         """The limit for the end of the floor that was seen free."""
-        least_m = self._config.margins.least_m
-        limit = stop_before(gap, motion, self._comfort, least_m, -math.inf, "unseen", "")
+        room = stopping_room(gap, motion, self._comfort, self._config.margins.least_m)
 
         def why() -> Reason:
             beyond = f"the floor beyond {max(gap.distance_m, 0.0):.1f} m was not seen free: "
-            required_m, margin_m = limit.reason.required_m, limit.reason.margin_m
             return Reason(
                 "unseen",
-                beyond + allowed_text(limit.speed_mps),
+                beyond + allowed_text(room.speed_mps),
                 distance_m=gap.distance_m,
-                required_m=required_m,
-                margin_m=margin_m,
+                required_m=room.required_m,
+                margin_m=room.spare_m,
             )
 
-        return Limit(limit.speed_mps, why)
+        return Limit(room.speed_mps, why)
 
     def _corner(self, corner: BlindCorner | None, front_m: float, motion: Motion) -> list[Limit]:
         """The limit for passing a blind corner: slow enough for whoever steps out."""

@@ -11,7 +11,7 @@ The files in the order in which they come into play:
 * run_sequence.py - runs all methods on one sequence; renders each frame once
 * simulate.py - the frames of a sequence: image, odometry, truth
 * truth.py - the truth about one frame
-* types.py - the truth of a frame, and a method's answer to it
+* types.py - the truth of a frame, and a method's output for it
 * timed_methods.py - the compared methods, each timed
 * ours.py - treadwatch as one of them
 * lidar_scan.py, lidar_clusters.py, lidar_matching.py, lidar_baseline.py - the lidar baseline

@@ -12,7 +12,7 @@ MIN_VISIBLE_PX = 400
 MAX_DISTANCE_M = 10.0
 MIN_VISIBLE_RATIO = 0.3
 MOVING_MPS = 0.1  # slower objects need not be found
-STANDING_MPS = 0.02  # slower objects stand: calling them moving is wrong ...
+OBJECT_REST_MPS = 0.02  # slower objects stand: calling them moving is wrong ...
 STANDING_S = 0.5  # ... once they have stood for this long
 SETTLING_S = 0.5  # an object need not be found in its first eligible frames, for this long
 
@@ -41,7 +41,7 @@ def judge_eligibility(frames: Sequence[FrameTruth]) -> list[dict[int, Verdict]]:
     for frame in frames:
         verdicts_by_id = {}
         for true in frame.objects:
-            if true.speed_mps >= STANDING_MPS or true.turning:
+            if true.speed_mps >= OBJECT_REST_MPS or true.turning:
                 last_moved_s[true.id] = frame.stamp_s
             eligibility = _eligibility(true, frame.stamp_s, last_moved_s.get(true.id))
             if eligibility is Eligibility.ELIGIBLE:

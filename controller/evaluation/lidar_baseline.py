@@ -16,7 +16,7 @@ from controller.evaluation.assignment import assign
 from controller.evaluation.lidar_clusters import find_clusters
 from controller.evaluation.lidar_matching import refine
 from controller.evaluation.lidar_scan import LidarModel, Scan
-from controller.evaluation.types import CALLED_MOVING, NO_BOX, Answer, DetectedObject
+from controller.evaluation.types import CALLED_MOVING, NO_BOX, DetectedObject, MethodOutput
 from hal.geometry import body_in_floor, camera_in_body
 from hal.types import CameraMount, FloatArray, Intrinsics, PlanarPose, Pose
 
@@ -123,7 +123,7 @@ class LidarTracker:
             track for track in self._tracks if scan.stamp_s - track.last_update_s <= _MAX_UNSEEN_S
         ]
 
-    def answer(self, t_s: float, odometry: PlanarPose) -> Answer:
+    def answer(self, t_s: float, odometry: PlanarPose) -> MethodOutput:
         """The tracks in the camera's field of view at t_s, in the optical frame; height is not measured."""
         self._predict_to(t_s)
         motion = self._motion_since_last_scan(odometry)
@@ -141,7 +141,7 @@ class LidarTracker:
                     track.id, NO_BOX, position, velocity, np.full(3, math.nan), _confidence(track)
                 )
             )  # fmt: skip
-        return Answer(tuple(detections))
+        return MethodOutput(tuple(detections))
 
     def _update_pose(self, scan: Scan, odometry: PlanarPose) -> None:
         """Update the robot's pose by odometry, corrected by matching this scan to the last one."""

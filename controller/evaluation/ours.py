@@ -8,7 +8,7 @@ import numpy as np
 
 from config.perception import PerceptionConfig
 from config.robot import Body
-from controller.evaluation.types import CALLED_MOVING, Answer, DetectedObject
+from controller.evaluation.types import CALLED_MOVING, DetectedObject, MethodOutput
 from hal.types import CameraMount, FloatArray, Pose, RgbdFrame
 from vision.perception import Perception
 from vision.scene import Fragments, Obstacle
@@ -25,10 +25,10 @@ class Treadwatch:
         self._perception = Perception(config, mount, body.height_m, body.clearance_m)
         self.fragments: Fragments | None = None
 
-    def observe(self, frame: RgbdFrame, odometry: Pose | None) -> Answer:
+    def observe(self, frame: RgbdFrame, odometry: Pose | None) -> MethodOutput:
         percept = self._perception.perceive(frame, odometry, None)
         self.fragments = percept.fragments
-        return Answer(tuple(detection_of(obstacle) for obstacle in percept.scene.obstacles))
+        return MethodOutput(tuple(detection_of(obstacle) for obstacle in percept.scene.obstacles))
 
 
 def detection_of(obstacle: Obstacle) -> DetectedObject:

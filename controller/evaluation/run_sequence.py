@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.evaluation.eligibility import MOVING_MPS, STANDING_MPS
+from controller.evaluation.eligibility import MOVING_MPS, OBJECT_REST_MPS
 from controller.evaluation.endpoint_error import EndpointErrors, endpoint_errors
 from controller.evaluation.ours import Treadwatch
 from controller.evaluation.pixels import STEP_PX, claimed_levels, count_pixels
@@ -25,7 +25,7 @@ from controller.evaluation.timed_methods import (
 )
 from controller.evaluation.totals import PixelCounts
 from controller.evaluation.truth import FrameTruthBuilder
-from controller.evaluation.types import Answer, DetectedObject, FrameDetections, FrameTruth
+from controller.evaluation.types import DetectedObject, FrameDetections, FrameTruth, MethodOutput
 from hal.types import ColourImage, RgbdFrame
 from sim.rendering.camera import intrinsics_of
 from vision.scene import Fragments
@@ -134,7 +134,7 @@ class _Recorder:
             tuple(self._snapshot(index, records, scores[index]) for index in self._shown if scores),
         )
 
-    def _count_pixels(self, simulated: SimulatedFrame, answer: Answer) -> PixelCounts:
+    def _count_pixels(self, simulated: SimulatedFrame, answer: MethodOutput) -> PixelCounts:
         levels = claimed_levels(simulated.frame, answer.detections) if answer.mask is None else answer.mask
         judged_pixels = np.s_[::STEP_PX, ::STEP_PX]
         objects = simulated.truth.objects
@@ -146,7 +146,7 @@ class _Recorder:
             excused=[
                 true_object.id
                 for true_object in objects
-                if true_object.turning or STANDING_MPS <= true_object.speed_mps < MOVING_MPS
+                if true_object.turning or OBJECT_REST_MPS <= true_object.speed_mps < MOVING_MPS
             ],
         )
 

@@ -99,14 +99,16 @@ def summarise(records: Sequence[SequenceRecord]) -> Summary:
     endpoint = sum((record.endpoint for record in records), EndpointErrors.none())
     beyond = endpoint.error_px[endpoint.distance_m >= BEYOND_M]
     return Summary(
-        splits,
-        per_object,
-        per_frame,
-        pixel_curve(pixels),
-        bin_by_distance(endpoint.distance_m, endpoint.error_px, endpoint_error.DISTANCE_BINS_M),
-        (float(np.median(beyond)), float(np.mean(beyond))) if len(beyond) else (math.nan, math.nan),
-        scores,
-        {record.name: record.split for record in records},
+        splits=splits,
+        per_object=per_object,
+        per_frame=per_frame,
+        per_pixel=pixel_curve(pixels),
+        endpoint=bin_by_distance(endpoint.distance_m, endpoint.error_px, endpoint_error.DISTANCE_BINS_M),
+        endpoint_beyond=(
+            (float(np.median(beyond)), float(np.mean(beyond))) if len(beyond) else (math.nan, math.nan)
+        ),
+        scores=scores,
+        split_of={record.name: record.split for record in records},
     )
 
 
@@ -140,8 +142,8 @@ def as_json(summary: Summary) -> dict[str, Any]:
         },
         "endpoint_error_px": {
             **_by_distance(summary.endpoint),
-            "beyond_2_m_median": number(summary.endpoint_beyond[0]),
-            "beyond_2_m_mean": number(summary.endpoint_beyond[1]),
+            f"beyond_{BEYOND_M:g}_m_median": number(summary.endpoint_beyond[0]),
+            f"beyond_{BEYOND_M:g}_m_mean": number(summary.endpoint_beyond[1]),
         },
         "sequences": {
             name: {

@@ -21,7 +21,7 @@ from controller.evaluation.ours import Treadwatch
 from controller.evaluation.scripted_drive import MOUNT, ScriptedDrive
 from controller.evaluation.sequences import Sequence
 from controller.evaluation.simulate import SimulatedFrame
-from controller.evaluation.types import Answer, Method
+from controller.evaluation.types import Method, MethodOutput
 from hal.clocks import NS_PER_MS
 from hal.types import Intrinsics
 from sim.world import World
@@ -46,7 +46,7 @@ BASELINES = (BACKGROUND, TRAJECTORIES, TRACKING, LOW_RANK, DENSE_FLOW)
 class TimedMethod(Protocol):
     """Answers the frames of one sequence in order."""
 
-    def answer(self, simulated: SimulatedFrame) -> tuple[Answer, float]:
+    def answer(self, simulated: SimulatedFrame) -> tuple[MethodOutput, float]:
         """The answer, and its processing time in milliseconds; NaN if there was nothing to process."""
         ...
 
@@ -59,7 +59,7 @@ class CameraMethod:
     with_odometry: bool
     stopwatch_ns: Stopwatch
 
-    def answer(self, simulated: SimulatedFrame) -> tuple[Answer, float]:
+    def answer(self, simulated: SimulatedFrame) -> tuple[MethodOutput, float]:
         start_ns = self.stopwatch_ns()
         answer = self.method.observe(simulated.frame, simulated.odometry if self.with_odometry else None)
         return answer, (self.stopwatch_ns() - start_ns) / NS_PER_MS
@@ -73,7 +73,7 @@ class TrackingMethod:
         self._stopwatch_ns = stopwatch_ns
         self._initialised: set[int] = set()
 
-    def answer(self, simulated: SimulatedFrame) -> tuple[Answer, float]:
+    def answer(self, simulated: SimulatedFrame) -> tuple[MethodOutput, float]:
         for identity, verdict in judge_eligibility([simulated.truth])[0].items():
             if verdict.eligibility is Eligibility.ELIGIBLE and identity not in self._initialised:
                 self._initialised.add(identity)
@@ -99,7 +99,7 @@ class LidarMethod:
         self._stopwatch_ns = stopwatch_ns
         self._next_scan = 0
 
-    def answer(self, simulated: SimulatedFrame) -> tuple[Answer, float]:
+    def answer(self, simulated: SimulatedFrame) -> tuple[MethodOutput, float]:
         now_s = simulated.truth.stamp_s
         odometry = self._drive.odometry(now_s)
         scan = None

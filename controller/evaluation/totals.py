@@ -95,11 +95,11 @@ def bin_by_distance(
     bin_index = np.digitize(distance_m, edges_m) - 1
     groups = [values[bin_index == index] for index in range(len(edges_m) - 1)]
     return ByDistance(
-        edges_m,
-        tuple(len(group) for group in groups),
-        tuple(float(np.median(group)) if len(group) else math.nan for group in groups),
-        tuple(float(np.mean(group)) if len(group) else math.nan for group in groups),
-        tuple(float(np.percentile(group, 90)) if len(group) else math.nan for group in groups),
+        edges_m=edges_m,
+        count=tuple(len(group) for group in groups),
+        median=tuple(float(np.median(group)) if len(group) else math.nan for group in groups),
+        mean=tuple(float(np.mean(group)) if len(group) else math.nan for group in groups),
+        p90=tuple(float(np.percentile(group, 90)) if len(group) else math.nan for group in groups),
     )
 
 
@@ -111,19 +111,17 @@ def total(scores: Sequence[SequenceScore], durations_ms: Sequence[float]) -> Fig
     distance = np.array([hit.distance_m for hit in hits])
     error = np.array([hit.speed_error_mps for hit in hits])
     known = np.isfinite(error)
-    found = sum(object_score.found for object_score in objects)
-    wrong = sum(len(sequence.wrong_objects) for sequence in scores)
     return Figures(
-        Counts(found, wrong, len(objects) - found),
-        _settled_counts(frames),
-        _frame_counts(frames),
-        sum(sequence.duration_s for sequence in scores) / 60.0,
-        tuple(object_score.latency_s for object_score in objects),
-        bin_by_distance(distance[known], error[known]),
-        float(np.median(error[known])) if known.any() else math.nan,
-        float(np.percentile(error[known], 90)) if known.any() else math.nan,
-        _found_by_distance(scores),
-        _median_known(durations_ms),
+        objects=_object_counts(scores),
+        settled=_settled_counts(scores),
+        frames=_frame_counts(frames),
+        minutes=sum(sequence.duration_s for sequence in scores) / 60.0,
+        latencies_s=tuple(object_score.latency_s for object_score in objects),
+        speed_error=bin_by_distance(distance[known], error[known]),
+        speed_error_median_mps=float(np.median(error[known])) if known.any() else math.nan,
+        speed_error_p90_mps=float(np.percentile(error[known], 90)) if known.any() else math.nan,
+        found_by_distance=_found_by_distance(scores),
+        ms_per_frame=_median_known(durations_ms),
     )
 
 
@@ -132,7 +130,15 @@ def _median_known(values: Sequence[float]) -> float:
     return float(np.median(known)) if known else math.nan
 
 
-def _settled_counts(frames: Sequence[FrameScore]) -> Counts:
+def _object_counts(scores: Sequence[SequenceScore]) -> Counts:
+    objects = [object_score for sequence in scores for object_score in sequence.objects]
+    found = sum(object_score.found for object_score in objects)
+    wrong = sum(len(sequence.wrong_objects) for sequence in scores)
+    return Counts(found, wrong, len(objects) - found)
+
+
+def _settled_counts(scores: Sequence[SequenceScore]) -> Counts:
+    frames = [frame for sequence in scores for frame in sequence.frames]
     return Counts(
         sum(hit.settled for frame in frames for hit in frame.hits),
         sum(len(frame.wrong) + len(frame.duplicates) for frame in frames),
@@ -183,9 +189,9 @@ def object_curves(method_answers: Sequence[MethodAnswers]) -> tuple[Curve, Curve
     """Precision-recall curves per object and per frame, over the threshold of confidence."""
     per_object, per_frame = [], []
     for threshold in THRESHOLDS:
-        figures = total([score(answers.truths, answers.answers, threshold) for answers in method_answers], ())
-        per_object.append(figures.objects)
-        per_frame.append(figures.settled)
+        scores = [score(answers.truths, answers.answers, threshold) for answers in method_answers]
+        per_object.append(_object_counts(scores))
+        per_frame.append(_settled_counts(scores))
     return _curve(THRESHOLDS, per_object), _curve(THRESHOLDS, per_frame)
 
 
@@ -231,7 +237,7 @@ def _curve(thresholds: tuple[float, ...], counts: Sequence[Counts]) -> Curve:
         if count.correct + count.wrong > 0 and count.correct + count.missed > 0
     ]
     return Curve(
-        tuple(point[0] for point in known),
-        tuple(point[1] for point in known),
-        tuple(point[2] for point in known),
+        thresholds=tuple(point[0] for point in known),
+        precision=tuple(point[1] for point in known),
+        recall=tuple(point[2] for point in known),
     )

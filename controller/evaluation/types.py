@@ -1,4 +1,4 @@
-"""The records that are compared: the truth of a frame, and a method's answer to it."""
+"""The records that are compared: the truth of a frame, and a method's output for it."""
 
 from __future__ import annotations
 
@@ -85,8 +85,8 @@ class FrameDetections:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Answer:
-    """A method's answer to one frame.
+class MethodOutput:
+    """A method's output for one frame.
 
     mask: (H / 2, W / 2) uint8, confidence 0..255 that a pixel moves; None for methods without a mask.
     """
@@ -98,7 +98,7 @@ class Answer:
 class Method(Protocol):
     """A method that finds moving objects. It gets the robot's data only, not the truth."""
 
-    def observe(self, frame: RgbdFrame, odometry: Pose | None) -> Answer:
+    def observe(self, frame: RgbdFrame, odometry: Pose | None) -> MethodOutput:
         """Process one frame. odometry: the camera's pose by dead reckoning in the odometry frame, if any."""
         ...
 

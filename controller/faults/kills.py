@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from controller.errors import UserError
+from sim.plant import PLANT_REST_MPS
 
-_STANDING_MPS = 1e-3  # slower than this the base stands
 _DRIVING_MPS = 0.3  # the fault comes when the base is faster than this
 _START_S = 40.0  # longest time until it drives
 _STOP_S = 15.0  # longest time until it stands, and until the drive ends
@@ -180,7 +180,7 @@ def run_kill(kind: str, config_path: Path, fault: str) -> KillResult:
         KILLS[fault](processes)
         stood_s = None
         if processes.base.poll() is None and KILLS[fault] is not _kill_base:
-            processes.wait_for_speed(lambda v_mps: v_mps < _STANDING_MPS, _STOP_S)
+            processes.wait_for_speed(lambda v_mps: v_mps < PLANT_REST_MPS, _STOP_S)
             stood_s = time.monotonic() - start_s
         if KILLS[fault] is _kill_control:
             return KillResult(fault, stood_s, None, None)

@@ -15,13 +15,13 @@ from controller.build_chassis import build_base_in_memory
 from controller.shape import SpeedShaper
 from hal.clocks import NS_PER_S
 from hal.types import ChassisMode, ChassisState, PlanarPose, Setpoint
+from sim.plant import PLANT_REST_MPS, PLANT_REST_RADPS
 
 # Every base that can be emulated.
 KINDS = tuple(sorted(path.stem.removeprefix("hil-") for path in CONFIG_DIR.glob("hil-*.yaml")))
 
 _PERIOD_NS = NS_PER_S // 50
 _SPEED_MPS = 0.5
-_STANDING = 1e-3  # m/s and rad/s; below both the base stands
 _GIVE_UP_S = 6.0  # longest time until it stands
 _OBSERVATION_S = 3.0  # time in which the base must not move by itself after the fault
 
@@ -61,7 +61,7 @@ class TrialRig:
     def standing(self) -> bool:
         """Whether the true base stands still."""
         v_mps, w_radps = self.emulator.plant.twist
-        return abs(v_mps) < _STANDING and abs(w_radps) < _STANDING
+        return abs(v_mps) < PLANT_REST_MPS and abs(w_radps) < PLANT_REST_RADPS
 
     @property
     def travelled_m(self) -> float:

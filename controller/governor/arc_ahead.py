@@ -76,7 +76,7 @@ class ArcAhead:
                 return self.path
         path = arc_path(pose, curvature_1pm, speed_mps, self._range_m, self._robot)
         known = self._look_again(path, v_mps)
-        self._decide.take_path(path, known)
+        self._decide.continue_along(path, known)
         self.path, self.known, self._laid_out = path, known, wanted
         self.on_path = OnPath(0.0, 0.0, 0.0)
         return path
@@ -84,7 +84,7 @@ class ArcAhead:
     def _look_again(self, path: Path, v_mps: float) -> WorldModel:
         """A world model for path, from the last scenes and the world model of the arc before."""
         before = self.known
-        known = self._decide.world_model(path, self._known_from_m)
+        known = self._decide.new_world_model(path, self._known_from_m)
         for scene in self._scenes:
             assert scene.robot_pose is not None
             if before is None or before.has_taken_in(scene):

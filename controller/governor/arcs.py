@@ -12,13 +12,15 @@ from controller import braking
 from controller.decision.decision import Reason
 from controller.governor.request import Twist
 from controller.path.path import Path
+from controller.path.path_speeds import YAW_RATE_FOR_THE_BEND, least_radius_m
 from hal.types import PlanarPose
 
-# Share of the yaw rate limit that an arc may use, as in controller/path/path.py; the rest is kept in reserve.
-_YAW_RATE_FOR_THE_BEND = 0.8
+# A requested arc is refused if it is within this factor of the tightest one that a path may have, so that
+# rounding does not make the path refuse it.
+_SPARE_RADIUS = 1.01
 # Slower requests count as standing: they are rounding errors of the planner or noise of encoders.
-STANDING_MPS = 0.005
-STANDING_RADPS = 0.005
+REQUESTED_REST_MPS = 0.005
+REQUESTED_REST_RADPS = 0.005
 # An arc with a radius of more than 10 km becomes a straight line (config.path.ArcSpec allows no larger one).
 _STRAIGHT_1PM = 1e-4
 # The path follows the arc for at most this angle, nearly half a turn.
@@ -63,14 +65,8 @@ def corner_m(robot: Robot) -> float:
 
 
 def tightest_m(robot: Robot) -> float:
-    """The least radius that can be driven: the inner track must not run backwards, and the path must accept
-    the bend (controller/path/path.py)."""
-    return 1.01 * max(robot.body.width_m / 2.0, _least_radius_by_yaw_m(robot))
-
-
-def _least_radius_by_yaw_m(robot: Robot) -> float:
-    # controller/path/path.py refuses a bend that cannot be driven at 0.1 m/s or more.
-    return 0.1 / (_YAW_RATE_FOR_THE_BEND * robot.limits.max_yaw_rate_radps)
+    """The least radius that is driven on request."""
+    return _SPARE_RADIUS * least_radius_m(robot)
 
 
 def understand(twist: Twist, robot: Robot) -> MotionRequest:
@@ -78,11 +74,11 @@ def understand(twist: Twist, robot: Robot) -> MotionRequest:
     v, w = twist.v_mps, twist.w_radps
     if not (math.isfinite(v) and math.isfinite(w)):
         return MotionRequest(Kind.REFUSED, why=f"the command is not a number: {v} m/s, {w} rad/s")
-    if v < -STANDING_MPS:
+    if v < -REQUESTED_REST_MPS:
         why = f"reverse at {-v:.2f} m/s is refused: the camera does not see behind"
         return MotionRequest(Kind.REFUSED, why=why)
-    if v <= STANDING_MPS:
-        if abs(w) <= STANDING_RADPS:
+    if v <= REQUESTED_REST_MPS:
+        if abs(w) <= REQUESTED_REST_RADPS:
             return MotionRequest(Kind.STAND)
         yaw_radps = min(abs(w), robot.limits.max_yaw_rate_radps)
         return MotionRequest(Kind.TURN, yaw_radps * corner_m(robot), left=1 if w > 0.0 else -1)
@@ -93,7 +89,7 @@ def understand(twist: Twist, robot: Robot) -> MotionRequest:
             why=f"a radius of {1.0 / abs(curvature):.2f} m is tighter than this robot can drive "
             f"({tightest_m(robot):.2f} m): ask for a wider arc, or for v = 0 to turn in place",
         )
-    yaw_radps = _YAW_RATE_FOR_THE_BEND * robot.limits.max_yaw_rate_radps
+    yaw_radps = YAW_RATE_FOR_THE_BEND * robot.limits.max_yaw_rate_radps
     top_mps = min(robot.limits.max_speed_mps, yaw_radps / max(abs(curvature), _STRAIGHT_1PM))
     return MotionRequest(Kind.ARC, min(v, top_mps), curvature)
 
@@ -116,7 +112,7 @@ def driveable(request: MotionRequest, v_mps: float, robot: Robot) -> MotionReque
     v_mps: the highest speed that the robot will still reach. If it is too fast for the requested arc, the
     robot slows down on the tightest arc that it can drive at that speed.
     """
-    most_1pm = robot.limits.max_yaw_rate_radps / max(v_mps, STANDING_MPS)
+    most_1pm = robot.limits.max_yaw_rate_radps / max(v_mps, REQUESTED_REST_MPS)
     if abs(request.curvature_1pm) <= most_1pm:
         return request
     return replace(request, curvature_1pm=math.copysign(most_1pm, request.curvature_1pm))
@@ -130,7 +126,7 @@ def arc_path(pose: PlanarPose, curvature_1pm: float, speed_mps: float, range_m: 
     """
     stop_m = braking.stop(robot.limits.max_speed_mps, 0.0, braking.comfort(robot.limits)).distance_m
     length_m = max(range_m, stop_m) + _BEYOND_M
-    most = max(min(speed_mps, 5.0), STANDING_MPS)
+    most = max(min(speed_mps, 5.0), REQUESTED_REST_MPS)
     start = StartSpec(x_m=pose.x_m, y_m=pose.y_m, heading_deg=math.degrees(pose.heading_rad))
     if abs(curvature_1pm) < _STRAIGHT_1PM:
         line = LineSpec(kind="line", length_m=length_m, max_speed_mps=most)

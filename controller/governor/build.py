@@ -7,12 +7,12 @@ from pathlib import Path as FilePath
 
 from config.app import AppConfig
 from config.governor import GovernorConfig
-from controller.answer import BaseAnswer
 from controller.build import build_path
 from controller.governor.governor import SpeedGovernor
 from controller.governor.inbox import Inbox
 from controller.governor.loop import Commands, GovernorLoop
 from controller.localise import Localiser
+from controller.response_monitor import ResponseMonitor
 from hal.api import Chassis, DatagramLink
 from hal.geometry import mount_of
 
@@ -34,9 +34,9 @@ def build_governor_loop(
 ) -> GovernorLoop:
     """A governor's control loop. chassis: opened elsewhere. Raises ConfigError, PathError."""
     start = build_path(config, config_path).start
-    answer = BaseAnswer(config.decision.chassis_delay_s, config.robot.limits.max_speed_mps)
+    response = ResponseMonitor(config.decision.chassis_delay_s, config.robot.limits.max_speed_mps)
     localiser = Localiser(start, mount_of(config.robot))
-    return GovernorLoop(build_governor(config), commands, localiser, chassis, answer)
+    return GovernorLoop(build_governor(config), commands, localiser, chassis, response)
 
 
 def build_inbox(link: DatagramLink, config: GovernorConfig, warn: Callable[[str], None]) -> Inbox:

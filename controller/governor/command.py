@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path as FilePath
 
 from config.app import AppConfig, RealtimeRunner, load_app
 from config.governor import GovernorConfig, InputConfig, UdpInputConfig
+from config.loader import resolve
 from controller.build import open_commands
 from controller.control import ControlStep
-from controller.ending import Outcome
+from controller.drive_lifecycle import Outcome
 from controller.errors import UserError
 from controller.governor.build import build_governor_loop, build_inbox
 from controller.governor.inbox import Inbox
@@ -35,7 +37,7 @@ class Governing(DriveResult):
     @property
     def succeeded(self) -> bool:
         """Whether it ended on request, without contact, within the limits."""
-        return self.loop.ending.outcome is Outcome.STOPPED and self.clean
+        return self.loop.lifecycle.outcome is Outcome.STOPPED and self.clean
 
 
 def run_governor(options: MissionOptions) -> int:
@@ -65,7 +67,10 @@ def _govern(
     options: MissionOptions,
     console: Console,
 ) -> Governing:
-    with realtime_rig(config, runner, options) as rig, open_commands(governor.input) as link:
+    with (
+        realtime_rig(config, runner, options) as rig,
+        open_commands(governor.input, options.config_path) as link,
+    ):
         inbox = build_inbox(link, governor, console.event)
         loop = build_governor_loop(config, options.config_path, rig.chassis, inbox)
         setpoints = SetpointTally(config.robot.limits, 1.0 / runner.control_rate_hz)
@@ -79,7 +84,7 @@ def _govern(
         )
 
         def ready(service: ServiceManager) -> None:
-            console.event(f"ready: commands are heard on {_where(governor.input)}")
+            console.event(f"ready: commands are heard on {_where(governor.input, options.config_path)}")
             service.ready("governing")
 
         with rig.under_way(loop, console, ready) as moments:
@@ -91,8 +96,10 @@ def _govern(
     return governing
 
 
-def _where(config: InputConfig) -> str:
-    return f"udp {config.host}:{config.port}" if isinstance(config, UdpInputConfig) else config.path
+def _where(config: InputConfig, config_path: FilePath) -> str:
+    if isinstance(config, UdpInputConfig):
+        return f"udp {config.host}:{config.port}"
+    return str(resolve(config.path, config_path))
 
 
 def _report(console: Console, governing: Governing, step: ControlStep) -> None:
@@ -111,11 +118,11 @@ def _summary_rows(config: AppConfig, governing: Governing) -> list[tuple[str, st
 
 def _drive_text(governing: Governing) -> str:
     last, loop = governing.last, governing.loop
-    ended = "ended" if loop.ending.outcome is None else loop.ending.outcome.value
+    ended = "ended" if loop.lifecycle.outcome is None else loop.lifecycle.outcome.value
     if last is None:
         return ended
     driven = f"{last.progress_m:.2f} m in {governing.duration_s:.1f} s"
-    return f"{ended} ({loop.ending.stop_reason}); {driven}"
+    return f"{ended} ({loop.lifecycle.stop_reason}); {driven}"
 
 
 def _commands_text(inbox: Inbox) -> str:

@@ -14,12 +14,11 @@ from config.decision import DecisionConfig
 from config.governor import GovernorConfig
 from config.perception import TYPICAL_DEPTH_NOISE, DepthNoise
 from config.robot import Robot
-from controller.answer import ANSWERS, Answer
 from controller.decision.camera_limits import condition_limit
 from controller.decision.decide import DecisionMaker
 from controller.decision.decision import Action, Decision, Reason
 from controller.decision.lens_cover import COVERED
-from controller.decision.limits import Limit, Motion, speed_to_decide_by
+from controller.decision.limits import STANDING_MPS, Limit, Motion, speed_to_decide_by
 from controller.decision.obstacle_boxes import bodies_of
 from controller.decision.situation import SceneError, Situation
 from controller.decision.surfaces import check_scan
@@ -30,13 +29,13 @@ from controller.governor.request import Twist
 from controller.governor.surroundings import GroundLimits
 from controller.localise import PoseHistory
 from controller.path.path import OnPath, Path
+from controller.response_monitor import NO_CAP, SpeedCap
 from controller.shape import SpeedShaper
 from hal.types import CameraMount, PlanarPose
 from vision.scene import CameraCondition, Scene
 
 # The remembered floor stands in for the camera up to this far beyond the floor that is free by consent.
 _NEAR_EXTRA_M = 0.3
-_STANDING_MPS = 0.01
 _SAME_MPS = 1e-3  # speeds that differ by less count as equal
 
 
@@ -105,7 +104,7 @@ class SpeedGovernor:
         pose: PlanarPose,
         measured_mps: float = math.nan,
         silence: str = "no command",
-        answer: Answer = ANSWERS,
+        cap: SpeedCap = NO_CAP,
     ) -> Governed:
         """What to command for one period from now_ns on.
 
@@ -114,7 +113,7 @@ class SpeedGovernor:
         pose: of the body, by odometry.
         measured_mps: by the chassis.
         silence: why nothing is requested.
-        answer: whether the chassis does what it is told.
+        cap: what the response of the base permits.
         """
         request = (
             MotionRequest(Kind.REFUSED, why=silence)
@@ -126,7 +125,7 @@ class SpeedGovernor:
         self._choose_motion(request)
         decision = self._decided(scene, pose, measured_mps, now_ns)
         decision = self._capped_to_request(decision, request, requested)
-        return self._command(decision, answer)
+        return self._command(decision, cap)
 
     def _look(self, scene: Scene | None, pose: PlanarPose, now_ns: int) -> None:
         """Remember each scene once. A scene without a pose gets the pose that the robot had at its time."""
@@ -256,15 +255,16 @@ class SpeedGovernor:
         action = Action.KEEP
         if target_mps > v + band:
             action = Action.INCREASE
-        elif target_mps < v - band or (target_mps == 0.0 and v > _STANDING_MPS):
+        elif target_mps < v - band or (target_mps == 0.0 and v > STANDING_MPS):
             action = Action.DECREASE
         stuck_ns = decision.stuck_since_ns if reason is decision.reason else None
-        return Decision(action, target_mps, reason, emergency and v > _STANDING_MPS, stuck_ns)
+        return Decision(action, target_mps, reason, emergency and v > STANDING_MPS, stuck_ns)
 
-    def _command(self, decision: Decision, answer: Answer) -> Governed:
+    def _command(self, decision: Decision, cap: SpeedCap) -> Governed:
         turns = self._motion.kind is Kind.TURN
-        target_mps = decision.target_speed_mps if turns else min(decision.target_speed_mps, answer.cap_mps)
-        shaped = self._shape.step(target_mps, emergency=decision.emergency or answer.hard)
+        # In a turn the commanded speed ahead is 0, so a cap of 0 means that the base runs away: end the turn.
+        target_mps = min(decision.target_speed_mps, cap.cap_mps)
+        shaped = self._shape.step(target_mps, emergency=decision.emergency or cap.hard)
         self._has_moved = self._has_moved or shaped.v_mps > 0.0
         if turns:
             w_radps = self._motion.left * shaped.v_mps / corner_m(self._robot)

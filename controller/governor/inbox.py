@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from config.governor import GovernorConfig
 from controller.decision.decision import Decision
-from controller.governor.request import MessageError, Request, Twist, answer, parse_request
+from controller.governor.request import MessageError, Request, Twist, encode_reply, parse_request
 from hal.api import DatagramLink
 from hal.clocks import NS_PER_MS, NS_PER_S
 from hal.errors import LinkLost
@@ -72,7 +72,7 @@ class Inbox:
         self._session: _Session | None = None
         self._heard: tuple[Sender | None, Request] | None = None
         self._heard_ns: int | None = None
-        self._to_answer: Request | None = None
+        self._reply_to: Request | None = None
         self._lost = ""
         self.dropped: Counter[str] = Counter()
         self.accepted = 0
@@ -95,18 +95,18 @@ class Inbox:
 
     def tell(self, v_mps: float, w_radps: float, decision: Decision, chassis: str) -> None:
         """Answer the newest message, once."""
-        request, self._to_answer = self._to_answer, None
+        request, self._reply_to = self._reply_to, None
         session = self._session
         if request is None or session is None or session.sender is None:
             return
-        message = answer(request, v_mps, w_radps, decision, chassis, self.dropped.total())
+        message = encode_reply(request, v_mps, w_radps, decision, chassis, self.dropped.total())
         if not self._link.send(message, session.sender):
             self.dropped["answers that could not be delivered"] += 1
 
     def _end_if_silent(self, now_ns: int) -> None:
         session = self._session
         if session is not None and now_ns - session.last_ns > self._config.timeout_s * NS_PER_S:
-            self._session, self._to_answer = None, None
+            self._session, self._reply_to = None, None
 
     def _read(self, now_ns: int) -> None:
         try:
@@ -140,7 +140,7 @@ class Inbox:
         session.steady_s += min(waited_s, _ONE_WAIT * self._config.resume_s)
         session.last, session.last_ns = request, now_ns
         self._heard, self._heard_ns = (sender, request), now_ns
-        self._to_answer = request
+        self._reply_to = request
         self.accepted += 1
 
     def _in_order(

@@ -9,15 +9,14 @@ from typing import Protocol
 
 import numpy as np
 
-from controller.answer import BaseAnswer
 from controller.control import ControlStep
 from controller.decision.decision import Decision
-from controller.driven_base import DrivenBase
-from controller.ending import Ending, Outcome
+from controller.driven_base import DriveLoop, DrivenBase
 from controller.governor.governor import SpeedGovernor
 from controller.governor.inbox import RequestState
 from controller.localise import Localiser
 from controller.record.recorder import path_ahead
+from controller.response_monitor import ResponseMonitor
 from hal.api import Chassis
 from hal.types import FloatArray, PlanarPose, Setpoint
 from vision.scene import Scene
@@ -31,7 +30,7 @@ class Commands(Protocol):
     def tell(self, v_mps: float, w_radps: float, decision: Decision, chassis: str) -> None: ...
 
 
-class GovernorLoop:
+class GovernorLoop(DriveLoop):
     """One control period of the governor, as controller.control.ControlLoop along a path.
 
     A silent planner is no fault: the robot stops, and goes on when commands come again. A chassis that
@@ -44,54 +43,35 @@ class GovernorLoop:
         commands: Commands,
         localiser: Localiser,
         chassis: Chassis,
-        answer: BaseAnswer,
+        response: ResponseMonitor,
     ) -> None:
-        self.localiser = localiser
+        super().__init__(DrivenBase(chassis, localiser, response))
         self._governor = governor
         self._commands = commands
-        self._base = DrivenBase(chassis, localiser, answer)
-        self._commanded_mps = 0.0
         self._travelled_m = 0.0
         self._came_from = localiser.pose
 
-    @property
-    def ending(self) -> Ending:
-        """Whether, how and why the drive has ended."""
-        return self._base.ending
-
-    @property
-    def finished(self) -> bool:
-        """Whether the drive has ended; then the chassis has been told to stop."""
-        return self._base.finished
-
-    def request_stop(self, reason: str, outcome: Outcome = Outcome.STOPPED) -> None:
-        """Stop by the comfort profile, then end with this outcome. The first reason is kept."""
-        self.ending.request_stop(reason, outcome)
-
     def step(self, scene: Scene | None, now_ns: int) -> ControlStep:
         """Take a request, govern it, send the setpoint, and answer the planner."""
-        self._base.begin(scene, now_ns)
+        cap = self._base.begin_step(scene, now_ns)
         asked = self._asked(now_ns)
         pose = self.localiser.pose
-        answer = self._base.answer(self._commanded_mps, now_ns)
-        if answer.zero or not self._base.obeys:
+        if cap.zero_reason or not self._base.obeys:
             # When the chassis follows setpoints again, shaping begins from standstill.
             self._governor.rest()
         governed = self._governor.step(
-            now_ns, scene, None if answer.zero else asked.twist, pose, self._base.measured_mps,
-            answer.zero or asked.silence, answer,
+            now_ns, scene, None if cap.zero_reason else asked.twist, pose, self._base.measured_mps,
+            cap.zero_reason or asked.silence, cap,
         )  # fmt: skip
         setpoint = Setpoint(now_ns, governed.v_mps, governed.a_mps2, governed.w_radps)
-        state = self._base.exchange(setpoint, now_ns, zero=answer.zero != "")
-        self._commanded_mps = governed.v_mps
+        state = self._base.finish_step(setpoint, now_ns, zero=cap.zero_reason != "")
         self._note_travel(pose)
-        self._base.conclude(setpoint, now_ns, arrived=False)
         self._commands.tell(governed.v_mps, governed.w_radps, governed.decision, self._mode)
         on_path = self._governor.on_path
         scene_ns = None if scene is None else scene.captured_ns
         return ControlStep(
             now_ns, pose, self._travelled_m, on_path.d_m, scene_ns, governed.decision, setpoint,
-            state, self._ahead(), governed.fault, answer.zero,
+            state, self._ahead(), governed.fault, cap.zero_reason,
         )  # fmt: skip
 
     def _asked(self, now_ns: int) -> RequestState:
@@ -99,8 +79,8 @@ class GovernorLoop:
         asked = self._commands.poll(now_ns)
         if not self._base.obeys:
             return RequestState(None, f"the chassis is not armed ({self._mode})")
-        if self.ending.stop_reason is not None:
-            return RequestState(None, self.ending.stop_reason)
+        if self.lifecycle.stop_reason is not None:
+            return RequestState(None, self.lifecycle.stop_reason)
         return asked
 
     def _note_travel(self, pose: PlanarPose) -> None:

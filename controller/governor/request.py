@@ -70,10 +70,10 @@ def parse_request(data: bytes) -> Request:
     )
 
 
-def answer(
+def encode_reply(
     request: Request, v_mps: float, w_radps: float, decision: Decision, chassis: str, dropped: int
 ) -> bytes:
-    """The answer as a datagram: what is commanded, and why. dropped: number of messages dropped so far."""
+    """The reply as a datagram: what is commanded, and why. dropped: number of messages dropped so far."""
     content = {
         "seq": request.seq,
         "v_mps": round(v_mps, 6),

@@ -12,7 +12,7 @@ from controller import braking
 from controller.decision.bodies import Bodies
 from controller.decision.corridor import Corridor
 from controller.decision.decision import Reason
-from controller.decision.limits import Gap, Limit, Motion, allowed_text, stop_before
+from controller.decision.limits import Gap, Limit, Motion, allowed_text, stop_before, stopping_room
 from controller.governor.arcs import corner_m
 from controller.governor.ground import CELL_M, IN_VIEW_NS, GroundMemory
 from controller.path.path import Path
@@ -60,11 +60,11 @@ class GroundLimits:
             found.append(stop_before(gap, motion, comfort, margins.stop_m, margins.least_m, "depth", what))
         if unknown.any():
             gap = Gap(max(float(cells[unknown.argmax()]) - front_s_m, 0.0))
-            limit = stop_before(gap, motion, comfort, margins.least_m, -math.inf, "unseen", "")
+            room = stopping_room(gap, motion, comfort, margins.least_m)
             sentence = f"the floor of the arc was never seen beyond {gap.distance_m:.1f} m: "
-            sentence += allowed_text(limit.speed_mps)
-            reason = Reason("unseen", sentence, distance_m=gap.distance_m, required_m=limit.reason.required_m)
-            found.append(Limit(limit.speed_mps, lambda: reason))
+            sentence += allowed_text(room.speed_mps)
+            reason = Reason("unseen", sentence, distance_m=gap.distance_m, required_m=room.required_m)
+            found.append(Limit(room.speed_mps, lambda: reason))
         return found
 
     def turn_objection(self, bodies: Bodies, pose: PlanarPose, now_ns: int) -> str:

@@ -17,7 +17,7 @@ from controller.build import (
     surroundings,
 )
 from controller.build_chassis import build_base
-from controller.ending import Outcome
+from controller.drive_lifecycle import Outcome
 from controller.errors import UserError
 from controller.lockstep import run_lockstep
 from controller.mission.blind_bends import blind_bend_warning

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path as FilePath
 
 from controller.control import ControlLoop, ControlStep
-from controller.ending import Outcome
+from controller.drive_lifecycle import Outcome
 from controller.realtime.runner import Punctuality, SceneMessage
 from controller.record.tally import (
     Complaints,
@@ -99,4 +99,4 @@ class MissionResult(DriveResult):
     @property
     def succeeded(self) -> bool:
         """Whether the robot reached the target or stopped as asked, and the drive was clean."""
-        return self.loop.ending.outcome in (Outcome.REACHED, Outcome.STOPPED) and self.clean
+        return self.loop.lifecycle.outcome in (Outcome.REACHED, Outcome.STOPPED) and self.clean

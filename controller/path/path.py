@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from config.loader import ConfigError
 from config.path import ArcSpec, PathSpec
 from config.robot import Robot
-from controller.path.path_pieces import pieces_of, sinc
-from controller.path.path_speeds import YAW_RATE_FOR_THE_BEND, section_speeds
+from controller.path.path_pieces import pieces_of
+from controller.path.path_speeds import least_radius_m, section_speeds
 from controller.path.projection import Projection
 from hal.compiled import compiled
 from hal.geometry import wrap_angle_rad
@@ -30,7 +30,6 @@ _NOW = np.zeros(1)
 # A pose is searched this far behind and ahead of where it was last.
 _LOOK_BACK_M = 0.25
 _LOOK_AHEAD_M = 2.0
-_SLOWEST_BEND_MPS = 0.1  # a bend that cannot be driven at this speed is refused
 _OPPOSED_RAD = math.radians(120.0)  # headings that differ by more are opposed
 
 
@@ -58,12 +57,8 @@ class Path:
         pieces = pieces_of(spec)
         self.length_m = pieces[-1].s_m
         _check_bends(spec, robot)
-        self._s = np.array([piece.s_m for piece in pieces])
-        self._x = np.array([piece.x_m for piece in pieces])
-        self._y = np.array([piece.y_m for piece in pieces])
-        self._heading = np.array([piece.heading_rad for piece in pieces])
-        self._curvature = np.array([piece.curvature_1pm for piece in pieces])
-        self.projection = Projection(pieces, self.poses)
+        self.projection = Projection(pieces)
+        self._s, _, _, _, self._curvature = self.projection.chain
         self._check_doubling_back(robot.body.width_m)
         speed_s, speed = section_speeds(spec, robot, self._curvature[1:-1], self._s[1:-1])
         self._speed_step_m = float(speed_s[1] - speed_s[0])
@@ -80,19 +75,8 @@ class Path:
         return PlanarPose(float(x[0]), float(y[0]), wrap_angle_rad(float(heading[0])))
 
     def poses(self, s_m: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """x_m, y_m and heading_rad (not wrapped) of the path at s_m, each of the shape of s_m."""
-        return self._poses_on(self._piece_at(s_m), s_m)
-
-    def _poses_on(self, k: IntArray, s_m: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        along = s_m - self._s[k]
-        half_turn = 0.5 * self._curvature[k] * along
-        chord = along * sinc(half_turn)
-        middle = self._heading[k] + half_turn
-        return (
-            self._x[k] + chord * np.cos(middle),
-            self._y[k] + chord * np.sin(middle),
-            middle + half_turn,
-        )
+        """x_m, y_m and heading_rad (not wrapped) of the path at s_m (S,), (S,) each."""
+        return self.projection.poses(s_m)
 
     def curvature(self, s_m: float) -> float:
         """Curvature in 1/m at s_m, positive to the left."""
@@ -166,9 +150,8 @@ def _between(values: FloatArray, place: float) -> float:
 
 
 def _check_bends(spec: PathSpec, robot: Robot) -> None:
-    """Refuse bends in which the inner track would run backwards, or the yaw rate leaves no speed to drive."""
-    slow_m = _SLOWEST_BEND_MPS / (robot.limits.max_yaw_rate_radps * YAW_RATE_FOR_THE_BEND)
-    tightest_m = max(robot.body.width_m / 2.0, slow_m)
+    """Refuse bends that are tighter than this robot can drive."""
+    tightest_m = least_radius_m(robot)
     for number, segment in enumerate(spec.segments):
         if isinstance(segment, ArcSpec) and segment.radius_m < tightest_m:
             raise PathError(

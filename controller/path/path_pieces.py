@@ -6,14 +6,13 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-import numpy as np
-
 from config.path import ArcSpec, PathSpec
-from hal.types import FloatArray
 
 # The body overhangs both ends of the path, so the path is extended straight on for what stands beyond them.
 EXTENSION_M = 20.0
 _BLEND_PIECES = 16
+# The chord of an arc that turns by less is as long as the arc, to a double's precision.
+_STRAIGHT_RAD = 1e-7
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,13 +33,14 @@ def pieces_of(spec: PathSpec) -> list[Piece]:
     return [_extension_back(chain[0]), *chain, _extension_ahead(chain[-1])]
 
 
-def sinc(angle_rad: FloatArray) -> FloatArray:
-    """sin(x) / x for |x| <= pi / 4 (no piece turns by more than 90 degrees), to 1e-11."""
-    square = angle_rad * angle_rad
-    series: FloatArray = 1.0 - square / 6.0 * (
-        1.0 - square / 20.0 * (1.0 - square / 42.0 * (1.0 - square / 72.0 * (1.0 - square / 110.0)))
-    )
-    return series
+def along_arc(
+    x_m: float, y_m: float, heading_rad: float, curvature_1pm: float, along_m: float
+) -> tuple[float, float, float]:
+    """x_m, y_m and heading_rad (not wrapped) along_m after this pose, on an arc of this curvature."""
+    half_turn = 0.5 * curvature_1pm * along_m
+    chord = along_m * (math.sin(half_turn) / half_turn if abs(half_turn) > _STRAIGHT_RAD else 1.0)
+    middle = heading_rad + half_turn
+    return x_m + chord * math.cos(middle), y_m + chord * math.sin(middle), middle + half_turn
 
 
 def _chain(spec: PathSpec) -> Iterator[Piece]:
@@ -52,11 +52,7 @@ def _chain(spec: PathSpec) -> Iterator[Piece]:
         steps = _arc_pieces(segment) if isinstance(segment, ArcSpec) else [(segment.length_m, 0.0)]
         for length, curvature in steps:
             yield Piece(s, length, x, y, heading, curvature)
-            half_turn = 0.5 * curvature * length
-            chord = length * float(sinc(np.array(half_turn)))
-            x += chord * math.cos(heading + half_turn)
-            y += chord * math.sin(heading + half_turn)
-            heading += 2.0 * half_turn
+            x, y, heading = along_arc(x, y, heading, curvature, length)
             s += length
 
 
@@ -75,24 +71,10 @@ def _arc_pieces(arc: ArcSpec) -> list[tuple[float, float]]:
 
 
 def _extension_back(piece: Piece) -> Piece:
-    return Piece(
-        -EXTENSION_M,
-        EXTENSION_M,
-        piece.x_m - EXTENSION_M * math.cos(piece.heading_rad),
-        piece.y_m - EXTENSION_M * math.sin(piece.heading_rad),
-        piece.heading_rad,
-        0.0,
-    )
+    x, y, heading = along_arc(piece.x_m, piece.y_m, piece.heading_rad, 0.0, -EXTENSION_M)
+    return Piece(-EXTENSION_M, EXTENSION_M, x, y, heading, 0.0)
 
 
 def _extension_ahead(piece: Piece) -> Piece:
-    turn = piece.curvature_1pm * piece.length_m
-    chord = piece.length_m * float(sinc(np.array(turn / 2.0)))
-    return Piece(
-        piece.s_m + piece.length_m,
-        EXTENSION_M,
-        piece.x_m + chord * math.cos(piece.heading_rad + turn / 2.0),
-        piece.y_m + chord * math.sin(piece.heading_rad + turn / 2.0),
-        piece.heading_rad + turn,
-        0.0,
-    )
+    x, y, heading = along_arc(piece.x_m, piece.y_m, piece.heading_rad, piece.curvature_1pm, piece.length_m)
+    return Piece(piece.s_m + piece.length_m, EXTENSION_M, x, y, heading, 0.0)

@@ -15,6 +15,14 @@ _SPEED_STEP_M = 0.05
 # Share of the robot's yaw rate that a bend may need. The rest is for the path controller: tracks slip in yaw
 # by 10 % and more.
 YAW_RATE_FOR_THE_BEND = 0.8
+_SLOWEST_BEND_MPS = 0.1  # a bend that cannot be driven at this speed is refused
+
+
+def least_radius_m(robot: Robot) -> float:
+    """The tightest bend: in a tighter one the inner track would run backwards, or the yaw rate leaves no
+    speed to drive."""
+    slow_m = _SLOWEST_BEND_MPS / (robot.limits.max_yaw_rate_radps * YAW_RATE_FOR_THE_BEND)
+    return max(robot.body.width_m / 2.0, slow_m)
 
 
 def section_speeds(

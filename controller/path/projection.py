@@ -7,12 +7,11 @@ straight, no search is needed; else it starts from the nearest of samples 0.25 m
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Annotated
 
 import numpy as np
 
-from controller.path.path_pieces import EXTENSION_M, Piece
+from controller.path.path_pieces import EXTENSION_M, Piece, along_arc
 from hal.compiled import compiled, inlined
 from hal.types import FloatArray, Integers
 
@@ -27,9 +26,11 @@ _STRAIGHT_1PM = 1e-7
 # than this share of the radius.
 _MIN_RADIUS_SHARE = 0.05
 
+_along_arc = inlined(along_arc)
+
 
 class Projection:
-    """Projects points onto a path.
+    """Projects points onto a path, and gives the path's poses.
 
     chain: the pieces of the path; the first and the last are straight extensions.
     straight_to: (P,) for each straight piece, index of the last one of the unbroken row of straight pieces
@@ -42,12 +43,7 @@ class Projection:
     sample_x: Samples
     sample_y: Samples
 
-    def __init__(
-        self,
-        pieces: list[Piece],
-        poses: Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray]],
-    ) -> None:
-        """poses: function that returns x_m, y_m and heading_rad (S,) of the path at s_m (S,)."""
+    def __init__(self, pieces: list[Piece]) -> None:
         self.chain = (
             np.array([piece.s_m for piece in pieces]),
             np.array([piece.x_m for piece in pieces]),
@@ -56,11 +52,16 @@ class Projection:
             np.array([piece.curvature_1pm for piece in pieces]),
         )
         samples = np.arange(-EXTENSION_M, pieces[-1].s_m + EXTENSION_M + _SAMPLE_M, _SAMPLE_M)
-        self.sample_x, self.sample_y, _ = poses(samples)
+        self.sample_x, self.sample_y, _ = self.poses(samples)
         self.straight_to = np.arange(len(pieces))
         for k in range(len(pieces) - 2, -1, -1):
             if pieces[k].curvature_1pm == 0.0 == pieces[k + 1].curvature_1pm:
                 self.straight_to[k] = self.straight_to[k + 1]
+
+    def poses(self, s_m: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """x_m, y_m and heading_rad (not wrapped) of the path at s_m (S,), (S,) each."""
+        x_m, y_m, heading_rad = _poses(self.chain, s_m)
+        return x_m, y_m, heading_rad
 
     def project(self, x_m: float, y_m: float, low_m: float, high_m: float) -> tuple[float, float, float]:
         """s_m, d_m and the path's heading_rad of a point, searched from low_m to high_m along the path."""
@@ -98,19 +99,30 @@ def _piece_at(s_m: float, starts: FloatArray) -> int:
 
 
 @inlined
-def _seen_from(chain: Chain, s_m: float, x_m: float, y_m: float) -> tuple[float, float, float, float]:
-    """Where a point is relative to the path's pose at s_m: ahead, left; and heading and curvature there."""
+def _pose_on(chain: Chain, s_m: float) -> tuple[float, float, float, float]:
+    """x_m, y_m, heading_rad (not wrapped) and curvature of the path at s_m."""
     starts, xs, ys, headings, bends = chain
     k = _piece_at(s_m, starts)
-    along = s_m - starts[k]
-    half_turn = 0.5 * bends[k] * along
-    chord = along * (math.sin(half_turn) / half_turn if abs(half_turn) > _STRAIGHT_1PM else 1.0)
-    middle = headings[k] + half_turn
-    dx = x_m - xs[k] - chord * math.cos(middle)
-    dy = y_m - ys[k] - chord * math.sin(middle)
-    heading = middle + half_turn
+    x_m, y_m, heading = _along_arc(xs[k], ys[k], headings[k], bends[k], s_m - starts[k])
+    return x_m, y_m, heading, bends[k]
+
+
+@compiled("UniTuple(float64[::1], 5), float64[:]")
+def _poses(chain: Chain, s_m: FloatArray) -> FloatArray:
+    """(3, S) x_m, y_m and heading_rad of the path at s_m (S,)."""
+    poses = np.empty((3, len(s_m)))
+    for k in range(len(s_m)):
+        poses[0, k], poses[1, k], poses[2, k], _ = _pose_on(chain, s_m[k])
+    return poses
+
+
+@inlined
+def _seen_from(chain: Chain, s_m: float, x_m: float, y_m: float) -> tuple[float, float, float, float]:
+    """Where a point is relative to the path's pose at s_m: ahead, left; and heading and curvature there."""
+    there_x_m, there_y_m, heading, bend = _pose_on(chain, s_m)
+    dx, dy = x_m - there_x_m, y_m - there_y_m
     cos, sin = math.cos(heading), math.sin(heading)
-    return dx * cos + dy * sin, dy * cos - dx * sin, heading, bends[k]
+    return dx * cos + dy * sin, dy * cos - dx * sin, heading, bend
 
 
 @inlined

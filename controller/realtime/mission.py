@@ -5,7 +5,7 @@ from __future__ import annotations
 from config.app import AppConfig, RealtimeRunner
 from config.chassis import AgilexChassisConfig, AnyChassisConfig, CanLinkConfig
 from controller.build import build_control
-from controller.ending import Outcome
+from controller.drive_lifecycle import Outcome
 from controller.mission.result import MissionOptions, MissionResult
 from controller.realtime.rig import realtime_rig
 from controller.record.tally import SetpointTally
@@ -36,8 +36,10 @@ def drive_realtime(
                 for message in moment.arrived:
                     result.take_message(message)
                 report(console, result, moment.control)
-    if loop.ending.outcome in (Outcome.NOT_ARMED, Outcome.CHASSIS_FAULT) and not was_armed:
-        raise DeviceRefused(f"{describe_base(config.chassis)}: {loop.ending.stop_reason}; nothing has moved")
+    if loop.lifecycle.outcome in (Outcome.NOT_ARMED, Outcome.CHASSIS_FAULT) and not was_armed:
+        raise DeviceRefused(
+            f"{describe_base(config.chassis)}: {loop.lifecycle.stop_reason}; nothing has moved"
+        )
     return result
 
 

@@ -14,7 +14,7 @@ from pathlib import Path as FilePath
 from config.app import AppConfig, RealtimeRunner
 from controller.build import build_path, build_perceiver, open_camera, surroundings
 from controller.control import ControlStep
-from controller.errors import UserError
+from controller.errors import UserError, describe
 from controller.localise import PoseHistory
 from controller.realtime.channel import Channel, PeerGone
 from controller.realtime.runner import CutOff, Farewell, SceneMessage, StepMessage
@@ -122,6 +122,7 @@ def perceive_forever(
 ) -> None:
     """Entry point of the process. Returns when the camera ends or the control process is gone.
 
+    An unforeseen error is told to the control process, and raised.
     start_ns: time zero of a simulated world.
     """
     channel = Channel(end)
@@ -136,6 +137,10 @@ def perceive_forever(
     except UserError as error:
         # An output cannot be opened. The control process reports this as the reason of the stop.
         _say_farewell(channel, str(error))
+    except Exception as error:
+        # Without a farewell the stop would have no reason but that this process is gone.
+        _say_farewell(channel, f"perception failed: {describe(error)}")
+        raise
 
 
 def _look_until_the_end(

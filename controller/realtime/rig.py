@@ -16,7 +16,7 @@ from config.app import AppConfig, RealtimeRunner
 from controller.build import build_path, build_simulation, require_camera
 from controller.build_chassis import build_base
 from controller.control import Drive
-from controller.ending import Ending, Outcome
+from controller.drive_lifecycle import DriveLifecycle, Outcome
 from controller.mission.result import MissionOptions
 from controller.realtime.channel import Channel, channel_sockets
 from controller.realtime.perception_process import perceive_forever
@@ -36,11 +36,11 @@ HEAD_START_S = 3.0
 GOODBYE_S = 5.0  # the perception process is killed if it has not ended after this time
 
 
-class EndingDrive(Drive, Protocol):
-    """A loop with the state of its ending."""
+class DriveWithLifecycle(Drive, Protocol):
+    """A loop that says whether, how and why its drive has ended."""
 
     @property
-    def ending(self) -> Ending: ...
+    def lifecycle(self) -> DriveLifecycle: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +66,7 @@ class RealtimeRig:
 
     @contextmanager
     def under_way(
-        self, loop: EndingDrive, console: Console, on_ready: Callable[[ServiceManager], None]
+        self, loop: DriveWithLifecycle, console: Console, on_ready: Callable[[ServiceManager], None]
     ) -> Iterator[Iterator[RealtimeMoment]]:
         """The control steps of a drive with this loop, until it has finished. Perception ends with the block.
 
@@ -87,14 +87,14 @@ class RealtimeRig:
                 self.runner, self.clock, self.simulation, link, loop, service, stop, self.punctuality
             )
             try:
-                yield self._told(moments, loop.ending, link, service, console, on_ready)
+                yield self._told(moments, loop.lifecycle, link, service, console, on_ready)
             except BaseException:
                 # Ending the perception process takes seconds; the base must not drive on meanwhile.
                 self.chassis.stop(self.clock.now_ns())
                 raise
             finally:
                 # The watchdog is no longer fed, and perception takes seconds to end and to close its files.
-                service.stopping(_why_over(loop.ending))
+                service.stopping(_why_over(loop.lifecycle))
                 stop.closing()
         self._take_cut_off(link, console, "")
 
@@ -107,7 +107,7 @@ class RealtimeRig:
     def _told(
         self,
         moments: Iterator[RealtimeMoment],
-        ending: Ending,
+        lifecycle: DriveLifecycle,
         link: PerceptionLink,
         service: ServiceManager,
         console: Console,
@@ -123,17 +123,17 @@ class RealtimeRig:
                 told_ready = True
                 on_ready(service)
             self._take_cut_off(link, console, "; the drive goes on without it")
-            if ending.stop_reason is not None:
-                service.stopping(ending.stop_reason)
+            if lifecycle.stop_reason is not None:
+                service.stopping(lifecycle.stop_reason)
             yield moment
-        if link.refused_reason is not None and ending.outcome is Outcome.BROKEN_OFF:
+        if link.refused_reason is not None and lifecycle.outcome is Outcome.BROKEN_OFF:
             raise DeviceRefused(f"{link.refused_reason}; nothing has moved")
 
 
-def _why_over(ending: Ending) -> str:
-    if ending.stop_reason is not None:
-        return ending.stop_reason
-    return "ended by an error" if ending.outcome is None else ending.outcome.value
+def _why_over(lifecycle: DriveLifecycle) -> str:
+    if lifecycle.stop_reason is not None:
+        return lifecycle.stop_reason
+    return "ended by an error" if lifecycle.outcome is None else lifecycle.outcome.value
 
 
 @contextmanager

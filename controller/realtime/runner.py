@@ -13,7 +13,7 @@ from typing import Protocol
 
 from config.app import RealtimeRunner
 from controller.control import ControlStep, Drive
-from controller.ending import Outcome
+from controller.drive_lifecycle import Outcome
 from controller.lockstep import Outside
 from controller.realtime.channel import Channel, PeerGone
 from controller.realtime.service import ServiceManager, StopRequest

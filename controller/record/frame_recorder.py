@@ -72,7 +72,10 @@ class FrameRecorder:
             return
         try:
             self._writer.write(frame, odometry)
-        except DeviceRefused:
+        except ValueError as error:
+            self._failed = True
+            raise DeviceRefused(f"{self._folder}: the recording ends here: {error}") from error
+        except Exception:
             self._failed = True
             raise
 

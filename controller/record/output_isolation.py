@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from typing import TypeVar
 
-from controller.errors import UserError
+from controller.errors import UserError, describe
 from hal.errors import HalError
 
 Output = TypeVar("Output")
@@ -33,12 +33,14 @@ class OutputIsolation:
         """Inside the block, a failure of this output is handled."""
         try:
             yield
-        except (UserError, HalError) as failure:
+        except Exception as failure:
+            # Unforeseen ones, too: an error in a picture of the video must not stop a robot that drives.
             if self._cut_off is None:
                 raise
             if self.is_active(output):
                 self._ended.append(output)
-                self._cut_off(str(failure))
+                foreseen = isinstance(failure, UserError | HalError)
+                self._cut_off(str(failure) if foreseen else f"{type(output).__name__}: {describe(failure)}")
 
     @contextmanager
     def open(self, files: AbstractContextManager[Output]) -> Iterator[Output]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from config.app import AppConfig
 from controller.control import ControlStep
-from controller.ending import Outcome
+from controller.drive_lifecycle import Outcome
 from controller.mission.result import DriveResult, MissionResult
 from controller.realtime.runner import Punctuality
 from controller.record.tally import SetpointTally, mean_speed_mps
@@ -18,7 +18,7 @@ from sim.simulation import Simulation
 
 def report(console: Console, result: MissionResult, step: ControlStep) -> None:
     """Print one control step: progress, a new decision, a long standstill, new complaints of the base."""
-    length_m, stops = result.loop.path.length_m, result.loop.ending.stop_reason
+    length_m, stops = result.loop.path.length_m, result.loop.lifecycle.stop_reason
     does = (
         f"{step.decision.action.value}: {step.decision.reason.sentence}"
         if stops is None
@@ -41,7 +41,7 @@ def report(console: Console, result: MissionResult, step: ControlStep) -> None:
 def summary_rows(config: AppConfig, result: MissionResult) -> list[tuple[str, str]]:
     """The summary as (subject, text)."""
     rows = [("mission", _mission_text(config, result)), ("target", _target_text(result))]
-    if result.last is not None and result.loop.ending.outcome is not Outcome.REACHED:
+    if result.last is not None and result.loop.lifecycle.outcome is not Outcome.REACHED:
         stood_s = result.standstill.elapsed_s(result.last.now_ns)
         if stood_s >= STUCK_S:
             rows.append(("standing", f"for the last {stood_s:.1f} s: {result.last.decision.reason.sentence}"))
@@ -86,11 +86,11 @@ def _punctuality_text(punctuality: Punctuality) -> str:
 
 
 def _mission_text(config: AppConfig, result: MissionResult) -> str:
-    outcome = result.loop.ending.outcome
+    outcome = result.loop.lifecycle.outcome
     over = f"given up: runner.max_duration_s of {config.runner.max_duration_s} s is over"
     ended = over if outcome is None else outcome.value
-    if outcome is not Outcome.REACHED and result.loop.ending.stop_reason:
-        ended += f" ({result.loop.ending.stop_reason})"
+    if outcome is not Outcome.REACHED and result.loop.lifecycle.stop_reason:
+        ended += f" ({result.loop.lifecycle.stop_reason})"
     length_m = 0.0 if result.last is None else result.last.progress_m
     mean = mean_speed_mps(length_m, result.duration_s)
     where = (

@@ -6,7 +6,7 @@ import numpy as np
 
 from controller.control import ControlStep
 from controller.decision.decision import Action, Decision, Reason
-from controller.ending import Outcome
+from controller.drive_lifecycle import Outcome
 from controller.perceive import Look
 from hal.types import RgbdFrame, Setpoint
 from tests.support.scenes import ORIGIN, chassis_state, scene

@@ -18,7 +18,7 @@ from controller.evaluation.baselines.masks import (
     half_grey,
     half_intrinsics,
 )
-from controller.evaluation.types import Answer
+from controller.evaluation.types import MethodOutput
 from hal.types import FloatArray, Pose, RgbdFrame
 
 _HISTORY = 30  # frames
@@ -38,7 +38,7 @@ class BackgroundModel:
         self._id_tracker = IdTracker()
         self._start_model()
 
-    def observe(self, frame: RgbdFrame, odometry: Pose | None) -> Answer:
+    def observe(self, frame: RgbdFrame, odometry: Pose | None) -> MethodOutput:
         """Odometry is not used."""
         grey = half_grey(frame)
         if self._previous is not None:

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from controller.evaluation.baselines.masks import SCALE, half_depth_m, half_intrinsics
-from controller.evaluation.types import Answer, Box, DetectedObject, unknown_vector
+from controller.evaluation.types import Box, DetectedObject, MethodOutput, unknown_vector
 from hal.types import ColourImage, FloatArray, Intrinsics, Pose, RgbdFrame
 
 _SEED = 20200127
@@ -36,7 +36,7 @@ class BoxTracking:
         """Give the true box of an object in the next frame; once for each object."""
         self._new_objects.append((object_id, box))
 
-    def observe(self, frame: RgbdFrame, odometry: Pose | None) -> Answer:
+    def observe(self, frame: RgbdFrame, odometry: Pose | None) -> MethodOutput:
         """Odometry is not used."""
         image = np.asarray(
             cv2.resize(frame.colour, None, fx=1.0 / SCALE, fy=1.0 / SCALE, interpolation=cv2.INTER_AREA),
@@ -55,7 +55,7 @@ class BoxTracking:
             boxes.append((object_id, box))
         self._new_objects.clear()
         depth_m, k = half_depth_m(frame), half_intrinsics(frame.intrinsics)
-        return Answer(
+        return MethodOutput(
             tuple(
                 DetectedObject(
                     object_id, box, _position(box, depth_m, k), unknown_vector(), unknown_vector(), 1.0

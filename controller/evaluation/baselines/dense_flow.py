@@ -19,7 +19,7 @@ from controller.evaluation.baselines.masks import (
     half_grey,
     half_intrinsics,
 )
-from controller.evaluation.types import Answer
+from controller.evaluation.types import MethodOutput
 from hal.types import FloatArray, Intrinsics, Pose, RgbdFrame
 
 _GRID_PX = 8
@@ -39,7 +39,7 @@ class DenseFlow:
         self._previous: tuple[Mask, HalfDepth] | None = None
         self._id_tracker = IdTracker()
 
-    def observe(self, frame: RgbdFrame, odometry: Pose | None) -> Answer:
+    def observe(self, frame: RgbdFrame, odometry: Pose | None) -> MethodOutput:
         """Odometry is not used; the images give the motion more accurately."""
         grey, depth_m, k = half_grey(frame), half_depth_m(frame), half_intrinsics(frame.intrinsics)
         previous, self._previous = self._previous, (grey, depth_m)

@@ -22,7 +22,7 @@ from controller.evaluation.baselines.masks import (
     half_grey,
     half_intrinsics,
 )
-from controller.evaluation.types import Answer
+from controller.evaluation.types import MethodOutput
 from hal.types import FloatArray, Pose, RgbdFrame
 
 _WINDOW = 16
@@ -42,7 +42,7 @@ class LowRank:
         self._to_newest: deque[FloatArray] = deque(maxlen=_WINDOW)
         self._id_tracker = IdTracker()
 
-    def observe(self, frame: RgbdFrame, odometry: Pose | None) -> Answer:
+    def observe(self, frame: RgbdFrame, odometry: Pose | None) -> MethodOutput:
         """Odometry is not used."""
         grey = half_grey(frame)
         if self._images:

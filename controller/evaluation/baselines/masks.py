@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.evaluation.assignment import assign
-from controller.evaluation.types import CALLED_MOVING, Answer, Box, DetectedObject, unknown_vector
+from controller.evaluation.types import CALLED_MOVING, Box, DetectedObject, MethodOutput, unknown_vector
 from hal.types import FloatArray, Intrinsics, RgbdFrame
 
 Mask = NDArray[np.uint8]
@@ -149,7 +149,7 @@ class IdTracker:
         self._tracks: list[_Track] = []
         self._next_id = 0
 
-    def answer(self, found: Sequence[Blob], mask: Mask | None) -> Answer:
+    def answer(self, found: Sequence[Blob], mask: Mask | None) -> MethodOutput:
         """The detections of this frame, with ids."""
         distance_m = np.array(
             [
@@ -173,7 +173,7 @@ class IdTracker:
                 )
             )
         self._tracks = [track for track in self._tracks if track.unseen <= _FORGET_FRAMES]
-        return Answer(tuple(detections), mask)
+        return MethodOutput(tuple(detections), mask)
 
     def _start_track(self) -> _Track:
         self._tracks.append(_Track(self._next_id, np.zeros(3), 0, 0))

@@ -24,7 +24,7 @@ from controller.evaluation.baselines.masks import (
     half_grey,
     half_intrinsics,
 )
-from controller.evaluation.types import Answer
+from controller.evaluation.types import MethodOutput
 from hal.types import FloatArray, Intrinsics, Pose, RgbdFrame
 
 _CORNERS = 400
@@ -59,7 +59,7 @@ class Trajectories:
         self._history: deque[_Snapshot] = deque(maxlen=_WINDOW)
         self._id_tracker = IdTracker()
 
-    def observe(self, frame: RgbdFrame, odometry: Pose | None) -> Answer:
+    def observe(self, frame: RgbdFrame, odometry: Pose | None) -> MethodOutput:
         """Odometry is not used."""
         grey, depth_m, k = half_grey(frame), half_depth_m(frame), half_intrinsics(frame.intrinsics)
         if self._previous is not None:

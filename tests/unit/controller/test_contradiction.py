@@ -7,13 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from config.robot import Robot
 from controller.contradiction import Contradiction, Motion
 from controller.control import ControlStep
-from controller.ending import Outcome
+from controller.drive_lifecycle import Outcome
+from controller.driven_base import DrivenBase
+from controller.localise import Localiser
+from controller.response_monitor import ResponseMonitor
 from hal.geometry import camera_in_body
-from hal.types import Pose
+from hal.types import Pose, Setpoint
 from tests.support.obedient_chassis import PERIOD_S, ObedientChassis
-from tests.support.scenes import scene
+from tests.support.scenes import ORIGIN, scene
 from tests.unit.controller.governor.test_loop import Rig
 from tests.unit.controller.test_control import MOUNT, PERIOD_NS, loop_on
 from vision.scene import EgoMotion, Scene
@@ -92,9 +96,10 @@ def test_contradiction_ends_the_drive_early_and_says_why() -> None:
     while not loop.finished and len(steps) < 1000:
         k, v_mps = len(steps), steps[-1].setpoint.v_mps if steps else 0.0
         steps.append(loop.step(sees_it_go_back(k * PERIOD_NS, k, v_mps), k * PERIOD_NS))
-    assert loop.ending.outcome is Outcome.BROKEN_OFF
-    assert "do its motors turn the right way" in (loop.ending.stop_reason or "")
+    assert loop.lifecycle.outcome is Outcome.BROKEN_OFF
+    assert "do its motors turn the right way" in (loop.lifecycle.stop_reason or "")
     assert steps[-1].progress_m < 1.0
+    assert brakes_harder_than_comfort(steps)
 
 
 def test_contradiction_ends_a_governed_drive_too() -> None:
@@ -106,5 +111,22 @@ def test_contradiction_ends_a_governed_drive_too() -> None:
         )
         if rig.loop.finished:
             break
-    assert rig.loop.ending.outcome is Outcome.BROKEN_OFF
-    assert "do its motors turn the right way" in (rig.loop.ending.stop_reason or "")
+    assert rig.loop.lifecycle.outcome is Outcome.BROKEN_OFF
+    assert "do its motors turn the right way" in (rig.loop.lifecycle.stop_reason or "")
+    assert brakes_harder_than_comfort(rig.steps)
+
+
+@pytest.mark.parametrize("contradicted", [False, True])
+def test_every_command_is_a_hard_one_only_while_the_images_contradict_the_odometry(
+    contradicted: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    localiser = Localiser(ORIGIN, MOUNT)
+    base = DrivenBase(ObedientChassis(arms_after=0), localiser, ResponseMonitor(0.2, 1.0))
+    base.begin_step(None, 0)
+    base.finish_step(Setpoint(0, 0.0, 0.0, 0.0), 0)
+    monkeypatch.setattr(Localiser, "contradiction", "goes elsewhere" if contradicted else "")
+    assert base.begin_step(None, PERIOD_NS).hard == contradicted
+
+
+def brakes_harder_than_comfort(steps: list[ControlStep]) -> bool:
+    return min(one.setpoint.a_mps2 for one in steps) < -Robot().limits.max_accel_mps2 - 0.02

@@ -7,13 +7,13 @@ import pytest
 from config.decision import DecisionConfig
 from config.path import LineSpec, PathSpec
 from config.robot import Robot
-from controller.answer import BaseAnswer
 from controller.control import ControlLoop, ControlStep
 from controller.decision.decide import DecisionMaker
-from controller.ending import Outcome
+from controller.drive_lifecycle import Outcome
 from controller.follow import PathFollower
 from controller.localise import Localiser
 from controller.path.path import Path
+from controller.response_monitor import ResponseMonitor
 from controller.shape import SpeedShaper
 from hal.api import Chassis
 from hal.types import CameraMount, ChassisMode, ChassisState, PlanarPose, Setpoint
@@ -34,7 +34,7 @@ def loop_on(chassis: Chassis, length_m: float = 3.0) -> ControlLoop:
         follow=PathFollower(path, ROBOT.limits),
         localiser=Localiser(path.start, MOUNT),
         chassis=chassis,
-        answer=BaseAnswer(0.2, ROBOT.limits.max_speed_mps),
+        response=ResponseMonitor(0.2, ROBOT.limits.max_speed_mps),
     )
 
 
@@ -53,7 +53,7 @@ def test_a_free_way_is_driven_to_its_end_and_the_chassis_is_stopped_there() -> N
     chassis = ObedientChassis()
     loop = loop_on(chassis)
     taken = drive(loop, 2000)
-    assert loop.ending.outcome is Outcome.REACHED
+    assert loop.lifecycle.outcome is Outcome.REACHED
     assert taken[-1].progress_m == pytest.approx(3.0, abs=0.02)
     assert chassis.stopped_at_ns == [taken[-1].now_ns]
     assert chassis.armed_at_ns == [0]
@@ -72,8 +72,8 @@ def test_a_robot_that_went_past_its_target_has_not_reached_it() -> None:
     chassis = SlidingChassis()
     loop = loop_on(chassis)
     taken = drive(loop, 2000)
-    assert loop.ending.outcome is Outcome.BROKEN_OFF
-    assert loop.ending.stop_reason == "went past the target"
+    assert loop.lifecycle.outcome is Outcome.BROKEN_OFF
+    assert loop.lifecycle.stop_reason == "went past the target"
     assert taken[-1].progress_m > 3.1
     assert chassis.stopped_at_ns == [taken[-1].now_ns]
 
@@ -102,8 +102,8 @@ def test_a_latched_chassis_ends_the_drive_with_its_reason() -> None:
     assert taken[-1].setpoint.v_mps > 0.2
     chassis.fault = ChassisMode.ESTOP
     drive(loop, 5, first=200)
-    assert loop.ending.outcome is Outcome.CHASSIS_FAULT
-    assert loop.ending.stop_reason == "e-stop pressed"
+    assert loop.lifecycle.outcome is Outcome.CHASSIS_FAULT
+    assert loop.lifecycle.stop_reason == "e-stop pressed"
     assert len(chassis.stopped_at_ns) == 1
 
 
@@ -112,7 +112,7 @@ def test_a_chassis_that_never_arms_is_given_up() -> None:
     chassis.fault = ChassisMode.STANDBY
     loop = loop_on(chassis)
     taken = drive(loop, 1000)
-    assert loop.ending.outcome is Outcome.NOT_ARMED
+    assert loop.lifecycle.outcome is Outcome.NOT_ARMED
     assert taken[-1].now_ns == pytest.approx(5.02e9, abs=0.05e9)
 
 
@@ -123,8 +123,8 @@ def test_a_requested_stop_is_jerk_limited_and_ends_at_rest() -> None:
     loop.request_stop("SIGTERM received")
     loop.request_stop("something later")
     taken = drive(loop, 1000, first=250)
-    assert loop.ending.outcome is Outcome.STOPPED
-    assert loop.ending.stop_reason == "SIGTERM received"
+    assert loop.lifecycle.outcome is Outcome.STOPPED
+    assert loop.lifecycle.stop_reason == "SIGTERM received"
     speeds = [step.setpoint.v_mps for step in taken]
     accelerations = [step.setpoint.a_mps2 for step in taken]
     assert speeds[0] > 0.5

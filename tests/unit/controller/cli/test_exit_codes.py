@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 from config.robot import Limits
 from controller.cli.commands import cli
-from controller.ending import Outcome
+from controller.drive_lifecycle import Outcome
 from controller.governor.command import Governing
 from controller.mission.result import DriveResult, MissionResult
 from controller.record.tally import SetpointTally
@@ -20,7 +20,7 @@ from tests.support.docs_pages import ROOT
 def ended(kind: Any, outcome: Outcome, *, violations: int = 0, contacts: tuple[str, ...] = ()) -> Any:
     tally = SetpointTally(Limits(), 0.02)
     tally.violations = violations
-    loop = SimpleNamespace(ending=SimpleNamespace(outcome=outcome))
+    loop = SimpleNamespace(lifecycle=SimpleNamespace(outcome=outcome))
     simulation = SimpleNamespace(referee=SimpleNamespace(contacts=list(contacts)))
     more = {"inbox": None} if kind is Governing else {}
     return kind(setpoints=tally, loop=loop, simulation=simulation, **more)

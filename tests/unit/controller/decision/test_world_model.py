@@ -122,7 +122,7 @@ def test_a_scan_that_does_not_tell_the_same_of_every_band_is_none(broken: FreeSp
 def test_depth_is_as_noisy_as_the_configuration_says() -> None:
     noise = DepthNoise(quadratic_per_m=0.002)
     config = ReplayConfig(perception=PerceptionConfig(depth_noise=noise))
-    known = build_replay_decision(config, MOUNT, None).world_model(PATH, 0.0)
+    known = build_replay_decision(config, MOUNT, None).new_world_model(PATH, 0.0)
     bench = Bench()
     known.update(bench.scene(), PlanarPose(0.0, 0.0, 0.0), START, 0.5, bench.now_ns)
     assert known.surfaces.noise == noise

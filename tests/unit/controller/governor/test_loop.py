@@ -12,15 +12,15 @@ import pytest
 from config.decision import DecisionConfig
 from config.governor import GovernorConfig
 from config.robot import Robot
-from controller.answer import BaseAnswer
 from controller.control import ControlStep
 from controller.decision.decision import Decision
-from controller.ending import ARM_TIMEOUT_S, Outcome
+from controller.drive_lifecycle import ARM_TIMEOUT_S, Outcome
 from controller.governor.governor import SpeedGovernor
 from controller.governor.inbox import RequestState
 from controller.governor.loop import GovernorLoop
 from controller.governor.request import Twist
 from controller.localise import Localiser
+from controller.response_monitor import ResponseMonitor
 from hal.types import CameraMount, ChassisMode, ChassisState, PlanarPose, Setpoint
 from tests.support.imperfect_base import ImperfectBase
 from tests.support.obedient_chassis import PERIOD_S, ObedientChassis
@@ -60,7 +60,7 @@ class Rig:
             self.planner,
             Localiser(ORIGIN, MOUNT),
             self.chassis,
-            BaseAnswer(0.2, ROBOT.limits.max_speed_mps),
+            ResponseMonitor(0.2, ROBOT.limits.max_speed_mps),
         )
         self.steps: list[ControlStep] = []
 
@@ -152,7 +152,10 @@ def test_a_latched_base_ends_it_and_no_command_leads_out() -> None:
     rig.run(3.0)
     rig.chassis.fault = ChassisMode.ESTOP
     rig.run(1.0)
-    assert (rig.loop.ending.outcome, rig.loop.ending.stop_reason) == (Outcome.CHASSIS_FAULT, "e-stop pressed")
+    assert (rig.loop.lifecycle.outcome, rig.loop.lifecycle.stop_reason) == (
+        Outcome.CHASSIS_FAULT,
+        "e-stop pressed",
+    )
     assert (len(rig.chassis.stopped_at_ns), len(rig.chassis.armed_at_ns)) == (1, 1)
 
 
@@ -160,7 +163,7 @@ def test_a_base_that_never_arms_is_given_up() -> None:
     rig = Rig()
     rig.chassis.fault = ChassisMode.STANDBY
     steps = rig.run(ARM_TIMEOUT_S + 1.0)
-    assert rig.loop.ending.outcome is Outcome.NOT_ARMED
+    assert rig.loop.lifecycle.outcome is Outcome.NOT_ARMED
     assert steps[-1].now_ns == pytest.approx((ARM_TIMEOUT_S + 0.02) * 1e9, abs=3e7)
 
 
@@ -171,7 +174,10 @@ def test_a_requested_stop_comes_to_rest_whatever_is_asked_and_ends(asked: Reques
     rig.loop.request_stop("SIGTERM received")
     rig.loop.request_stop("later", Outcome.BROKEN_OFF)
     steps = rig.run(20.0)
-    assert (rig.loop.ending.outcome, rig.loop.ending.stop_reason) == (Outcome.STOPPED, "SIGTERM received")
+    assert (rig.loop.lifecycle.outcome, rig.loop.lifecycle.stop_reason) == (
+        Outcome.STOPPED,
+        "SIGTERM received",
+    )
     last = steps[-1].setpoint
     assert (last.v_mps, last.a_mps2, last.w_radps) == (0.0, 0.0, 0.0)
     assert steps[-1].decision.reason.sentence == "SIGTERM received: stop"
@@ -187,12 +193,12 @@ def test_the_way_ahead_is_the_arc_for_pictures() -> None:
 
 
 def test_a_base_that_fell_behind_is_told_zero_and_begins_again_gently() -> None:
-    """controller/answer.py, as in a drive along a path."""
+    """controller/response_monitor.py, as in a drive along a path."""
     base = ImperfectBase(unresponsive_s=(3.0, 3.8))
     planner = Planner(lambda _: GO)
     governor = SpeedGovernor(GovernorConfig(), DecisionConfig(), ROBOT, MOUNT, PERIOD_S)
-    answer = BaseAnswer(0.2, ROBOT.limits.max_speed_mps)
-    loop = GovernorLoop(governor, planner, Localiser(ORIGIN, MOUNT), base, answer)
+    response = ResponseMonitor(0.2, ROBOT.limits.max_speed_mps)
+    loop = GovernorLoop(governor, planner, Localiser(ORIGIN, MOUNT), base, response)
     steps = []
     for k in range(500):
         seen = scene(k * PERIOD_NS, k, space=free_space(), pose=loop.localiser.pose)

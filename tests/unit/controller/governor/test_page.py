@@ -17,12 +17,12 @@ from controller.__main__ import main
 from controller.decision.decision import Action, Decision, Reason
 from controller.governor.governor import Governed
 from controller.governor.ground import _TRAVEL_M
-from controller.governor.request import MOST_BYTES, MOST_MPS, Request, Twist, answer, parse_request
+from controller.governor.request import MOST_BYTES, MOST_MPS, Request, Twist, encode_reply, parse_request
 
 ROOT = CONFIG_DIR.parent
 PAGE = (ROOT / "docs" / "governor.md").read_text()
 KEEP = Decision(Action.KEEP, 0.5, Reason("requested", "as asked"))
-ANSWER = answer(Request(1, 0.0, Twist(0.5, 0.02)), 0.5, 0.02, KEEP, "armed", 0)
+ANSWER = encode_reply(Request(1, 0.0, Twist(0.5, 0.02)), 0.5, 0.02, KEEP, "armed", 0)
 PYTHON = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
 
 
@@ -36,7 +36,8 @@ def test_the_answer_on_the_page_has_the_keys_of_the_program() -> None:
     shown = json.loads(text[: text.index("}") + 1])
     decision = Decision(Action.KEEP, 0.0, Reason("free", "the way is free"))
     assert (
-        shown.keys() == json.loads(answer(Request(1, 0.0, Twist(0.0, 0.0)), 0.0, 0.0, decision, "", 0)).keys()
+        shown.keys()
+        == json.loads(encode_reply(Request(1, 0.0, Twist(0.0, 0.0)), 0.0, 0.0, decision, "", 0)).keys()
     )
 
 

@@ -3,7 +3,7 @@ import json
 import pytest
 
 from controller.decision.decision import Action, Decision, Reason
-from controller.governor.request import MessageError, Request, Twist, answer, parse_request
+from controller.governor.request import MessageError, Request, Twist, encode_reply, parse_request
 
 GOOD = {"seq": 7, "t_s": 1.5, "v_mps": 0.5, "w_radps": -0.1}
 
@@ -60,7 +60,7 @@ def test_a_datagram_that_is_no_request(data: bytes) -> None:
 
 def test_the_answer_says_what_is_commanded_and_why() -> None:
     decision = Decision(Action.DECREASE, 0.2, Reason("static", "obstacle 3 stands on the path", 3))
-    told = json.loads(answer(Request(7, 1.5, Twist(0.5, -0.1)), 0.25, -0.05, decision, "armed", 2))
+    told = json.loads(encode_reply(Request(7, 1.5, Twist(0.5, -0.1)), 0.25, -0.05, decision, "armed", 2))
     assert told == {
         "seq": 7,
         "v_mps": 0.25,

@@ -3,10 +3,12 @@ import math
 from collections.abc import Iterator
 from pathlib import Path
 
+import cv2
 import pytest
 
 from config.app import load_app
 from config.loader import CONFIG_DIR
+from controller.perceive import Perceiver
 from controller.realtime.channel import Channel, PeerGone, channel_sockets
 from controller.realtime.perception_process import RemoteBody, perceive_forever
 from controller.realtime.runner import Farewell, StepMessage
@@ -151,3 +153,18 @@ def test_a_recording_that_cannot_be_written_is_told_to_the_control_process(tmp_p
         told = Channel(here).receive()
     assert isinstance(told, Farewell)
     assert "observations cannot be written there" in told.reason
+
+
+def test_unforeseen_error_is_told_to_the_control_process_and_raised(monkeypatch: pytest.MonkeyPatch) -> None:
+    def look(*_: object) -> None:
+        raise cv2.error("OpenCV(4.12.0)\n imgproc: (-215) !empty()\n")
+
+    monkeypatch.setattr(Perceiver, "look", look)
+    config_path = CONFIG_DIR / "sim-realtime.yaml"
+    here, there = channel_sockets()
+    with here, there:
+        Channel(here).send(step_at(0, 0.0, 0.0, PlanarPose(0.0, 0.0, 0.0)))
+        with pytest.raises(cv2.error):
+            perceive_forever(load_app(config_path), config_path, there, 0, RecordingOptions())
+        told = Channel(here).receive()
+    assert told == Farewell("perception failed: error: OpenCV(4.12.0) imgproc: (-215) !empty()")

@@ -14,7 +14,7 @@ from config.app import RealtimeRunner, load_app
 from config.loader import CONFIG_DIR
 from controller.build import build_control
 from controller.control import ControlLoop
-from controller.ending import Outcome
+from controller.drive_lifecycle import Outcome
 from controller.mission.result import MissionOptions
 from controller.realtime import rig as realtime_rig
 from controller.realtime.channel import Channel, PeerGone, channel_sockets
@@ -105,7 +105,7 @@ def test_the_service_manager_is_told_of_every_end_before_perception_is_waited_fo
             elif end == "wish":
                 loop.request_stop("asked to")
             else:
-                loop.ending.outcome = Outcome.REACHED
+                loop.lifecycle.outcome = Outcome.REACHED
             for _ in moments:
                 pass
 

@@ -1,5 +1,6 @@
 """What fails to be written ends by itself in real time, and ends the run where nothing moves."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +9,7 @@ import pytest
 from controller.errors import UserError
 from controller.record.observations import ObservationFile
 from controller.record.recorder import Recorder, RecordingOptions, open_recorder
+from controller.video.compose import Composer
 from controller.video.writer import VideoError, VideoWriter
 from hal.cameras.tum_replay import TumReplay
 from hal.cameras.tum_writer import TumWriter
@@ -89,3 +91,38 @@ def test_a_file_that_cannot_be_opened_is_refused_at_once(tmp_path: Path) -> None
         open_recorder(options, AROUND, lambda _why: None),
     ):
         pass
+
+
+def test_unforeseen_error_in_an_output_ends_that_output_only(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: list[str] = []
+
+    def compose(*_: object) -> None:
+        raise ValueError("operands could not be\nbroadcast")
+
+    monkeypatch.setattr(Composer, "compose", compose)
+    options = RecordingOptions(tmp_path / "o.jsonl", tmp_path / "v.mp4")
+    with open_recorder(options, AROUND, told.append) as recorder:
+        record(recorder, 3)
+    assert told == ["VideoWriter: ValueError: operands could not be broadcast"]
+    assert len((tmp_path / "o.jsonl").read_text().splitlines()) == 3
+    with pytest.raises(ValueError, match="broadcast"), open_recorder(options, AROUND) as recorder:
+        record(recorder, 1)
+
+
+def test_recording_ends_where_the_camera_comes_back_with_another_lens(tmp_path: Path) -> None:
+    """TumWriter refuses such a frame with a ValueError."""
+    told: list[str] = []
+    with open_recorder(RecordingOptions(frames=tmp_path), AROUND, told.append) as recorder:
+        camera = PeriodicCamera(33_000_000)
+        look = EmptyScenePerceiver().look(camera.read(0.0))
+        recorder.record(look, None)
+        then = camera.read(0.0)
+        other = replace(then, intrinsics=replace(then.intrinsics, fx=2.0 * then.intrinsics.fx))
+        recorder.record(replace(look, frame=other), None)
+        third = camera.read(0.0)
+        recorder.record(replace(look, frame=third), None)
+    reason = "a recording has one camera: intrinsics or depth scale changed"
+    assert told == [f"{tmp_path}: the recording ends here: {reason}"]
+    assert TumReplay(tmp_path).frame_count == 1

@@ -1,6 +1,6 @@
 """How a drive begins and ends: it arms the chassis, takes requests to stop, and tells when the robot rests.
 
-Both control loops (controller/control.py, controller/governor/loop.py) call it in each step.
+controller/driven_base.py calls it in each step of both control loops.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ ARM_TIMEOUT_S = 5.0
 REST_TIMEOUT_S = 6.0
 
 # Below these, measured speeds count as rest: the jitter of a coarse encoder, the noise of a gyro.
-REST_MPS = 0.02
-REST_RADPS = 0.05
+MEASURED_REST_MPS = 0.02
+MEASURED_REST_RADPS = 0.05
 
 
 class Outcome(Enum):
@@ -35,7 +35,7 @@ class Outcome(Enum):
     NOT_ARMED = "the chassis did not arm"
 
 
-class Ending:
+class DriveLifecycle:
     """Arms the chassis at the first step of a drive; decides whether, how and why the drive is over.
 
     Then it stops the chassis. A chassis that latches a fault or is lost ends every drive, and only a person
@@ -61,18 +61,18 @@ class Ending:
             self.stop_reason = reason
             self._asked_for = outcome
 
-    def begin(self, now_ns: int) -> None:
+    def arm_once(self, now_ns: int) -> None:
         """Call before each step; the first call arms the chassis."""
         if self._started_ns is None:
             self._started_ns = now_ns
             self._chassis.arm(now_ns)
 
-    def conclude(self, state: ChassisState, setpoint: Setpoint, now_ns: int, *, arrived: bool) -> None:
+    def check_end(self, state: ChassisState, setpoint: Setpoint, now_ns: int, *, arrived: bool) -> None:
         """Call after each step, with what was sent and answered.
 
         arrived: whether the robot is where this drive leads to.
         """
-        assert self._started_ns is not None, "concluded before it began"
+        assert self._started_ns is not None, "checked before it began"
         if state.mode is ChassisMode.ARMED:
             self._was_armed = True
         elif self._was_armed or state.mode in LATCHED_MODES:
@@ -99,7 +99,8 @@ class Ending:
         need not have reported anything.
         """
         trusted = not self._was_armed
-        slow = abs(state.v_mps) <= REST_MPS and abs(state.w_radps) <= REST_RADPS  # NaN is not
+        # NaN is no rest.
+        slow = abs(state.v_mps) <= MEASURED_REST_MPS and abs(state.w_radps) <= MEASURED_REST_RADPS
         if not (slow or trusted):
             self._resting_since_ns = None
             return False

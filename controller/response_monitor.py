@@ -1,4 +1,4 @@
-"""Whether the base answers its commands, judged by its measured speed. If not, no command may get faster.
+"""Whether the base responds to its commands, judged by its measured speed. If not, no command may get faster.
 
 A base that receives nothing for a while is stopped by its own time-out. If the command went on rising
 meanwhile, the base would jump to it as soon as it receives again. So it is commanded to zero, and the profile
@@ -15,7 +15,7 @@ from hal.clocks import NS_PER_S
 from hal.records import record
 
 # Window beyond the base's lag in which it has to do part of the least speed that was commanded.
-_ANSWERS_S = 0.4
+_RESPONSE_S = 0.4
 # Minimum command that is judged: bases that have just begun to move report less.
 _CLEAR_MPS = 0.1
 # Shares of that command. From the first one on the base follows. A base that had followed and falls below the
@@ -39,35 +39,35 @@ _REPORTS = 2
 
 
 @record(frozen=True, slots=True)
-class Answer:
-    """Whether the base answers, as instructions for the next command.
+class SpeedCap:
+    """What the base's response permits of the next command.
 
-    cap_mps: greatest command; inf: the base answers.
+    cap_mps: greatest command; inf: the base responds.
     hard: slow down to cap_mps with the jerk of an emergency.
-    zero: why zero is commanded now and the profile begins anew; "" if it is not.
+    zero_reason: why zero is commanded now and the profile begins anew; "" if it is not.
     ends: commanding zero does not help, and the drive has to end.
     dips: nothing can be learnt of the base's lag now.
     """
 
     cap_mps: float = math.inf
     hard: bool = False
-    zero: str = ""
+    zero_reason: str = ""
     ends: bool = False
     dips: bool = False
 
 
 # The base follows its commands.
-ANSWERS = Answer()
+NO_CAP = SpeedCap()
 
 
-class BaseAnswer:
+class ResponseMonitor:
     """Compares commanded and measured speed, once for each report of the base.
 
     lag_s: configured lag of the base. top_mps: the robot's greatest speed.
     """
 
     def __init__(self, lag_s: float, top_mps: float) -> None:
-        self._window_ns = round((_ANSWERS_S + lag_s) * NS_PER_S)
+        self._window_ns = round((_RESPONSE_S + lag_s) * NS_PER_S)
         self._least = _Extreme(self._window_ns, sign=-1.0)
         self._most = _Extreme(_LAG_NS, sign=1.0)
         self._did = _Extreme(_DIPS_NS, sign=1.0)
@@ -76,27 +76,29 @@ class BaseAnswer:
         self._since_ns: int | None = None
         self._fell = self._behind = self._dips = self._runs = self._back = 0
         self._followed = self._went_back = False
-        self._answer = ANSWERS
+        self._cap = NO_CAP
 
     def restart(self) -> None:
-        """Forget all reports: the base does not obey now, so what it does is no answer."""
+        """Forget all reports: the base does not obey now, so what it does is no response."""
         self._forget()
         self._went_back = False
 
-    def step(self, commanded_mps: float, measured_mps: float, feedback_ns: int | None, now_ns: int) -> Answer:
+    def step(
+        self, commanded_mps: float, measured_mps: float, feedback_ns: int | None, now_ns: int
+    ) -> SpeedCap:
         """Compare commanded_mps, commanded until now_ns, with measured_mps, reported at feedback_ns."""
         if self._since_ns is None:
             self._since_ns = now_ns
         self._least.add(commanded_mps, now_ns)
         self._most.add(commanded_mps, now_ns)
         if feedback_ns is None or feedback_ns == self._report_ns or not math.isfinite(measured_mps):
-            return self._answer
+            return self._cap
         self._report_ns = feedback_ns
         since_long = now_ns - self._since_ns >= self._window_ns
         least_mps = self._least.value if since_long else 0.0
         self._did.add(measured_mps, now_ns)
         self._count(commanded_mps, measured_mps, least_mps)
-        self._answer = ANSWERS
+        self._cap = NO_CAP
         if self._back >= _REPORTS:
             return self._goes_back(measured_mps)
         if self._fell >= _REPORTS and self._followed:
@@ -105,12 +107,12 @@ class BaseAnswer:
             )
         if self._runs >= _REPORTS:
             # Not lower than now: the driver sees a base that runs away best at this command, and latches it.
-            self._answer = Answer(commanded_mps, hard=True)
+            self._cap = SpeedCap(commanded_mps, hard=True)
         elif self._behind >= _REPORTS:
-            self._answer = Answer(max(measured_mps, _BREAKS_LOOSE_MPS))
+            self._cap = SpeedCap(max(measured_mps, _BREAKS_LOOSE_MPS))
         elif self._dips >= _REPORTS and self._followed:
-            self._answer = Answer(commanded_mps, dips=True)
-        return self._answer
+            self._cap = SpeedCap(commanded_mps, dips=True)
+        return self._cap
 
     def _count(self, commanded_mps: float, measured_mps: float, least_mps: float) -> None:
         clear = least_mps >= _CLEAR_MPS
@@ -127,7 +129,7 @@ class BaseAnswer:
         self._runs = self._runs + 1 if runs else 0
         self._back = self._back + 1 if measured_mps < _BACKWARDS_MPS and commanded_mps > 0.0 else 0
 
-    def _goes_back(self, measured_mps: float) -> Answer:
+    def _goes_back(self, measured_mps: float) -> SpeedCap:
         """Begin anew the first time, since the base may have rolled back; end the drive the second time.
 
         A base that goes back again before it has followed would do so for ever, each time too briefly for
@@ -138,18 +140,18 @@ class BaseAnswer:
         if not again:
             return self._begin_anew(why)
         self._forget()
-        return Answer(zero=f"{why}, again; do its motors turn the right way?", ends=True)
+        return SpeedCap(zero_reason=f"{why}, again; do its motors turn the right way?", ends=True)
 
-    def _begin_anew(self, why: str) -> Answer:
+    def _begin_anew(self, why: str) -> SpeedCap:
         self._forget()
-        return Answer(zero=f"{why}; it was told zero, and begins again gently")
+        return SpeedCap(zero_reason=f"{why}; it was told zero, and begins again gently")
 
     def _forget(self) -> None:
         self._least.clear()
         self._since_ns = None
         self._fell = self._behind = self._dips = self._runs = self._back = 0
         self._followed = False
-        self._answer = ANSWERS
+        self._cap = NO_CAP
 
 
 class _Extreme:

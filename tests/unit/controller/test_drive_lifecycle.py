@@ -3,13 +3,13 @@ from dataclasses import replace
 
 import pytest
 
-from controller.ending import (
+from controller.drive_lifecycle import (
     ARM_TIMEOUT_S,
-    REST_MPS,
-    REST_RADPS,
+    MEASURED_REST_MPS,
+    MEASURED_REST_RADPS,
     REST_TIMEOUT_S,
     SETTLE_S,
-    Ending,
+    DriveLifecycle,
     Outcome,
 )
 from hal.types import ChassisMode, Setpoint
@@ -18,11 +18,11 @@ from tests.support.scenes import chassis_state
 
 
 class Drive:
-    """An ending, stepped at 50 Hz until it has come."""
+    """A lifecycle, stepped at 50 Hz until its end."""
 
     def __init__(self) -> None:
         self.chassis = ObedientChassis()
-        self.ending = Ending(self.chassis)
+        self.lifecycle = DriveLifecycle(self.chassis)
         self.now_ns = 0
         self.heard_ns: int | None = None
 
@@ -38,18 +38,18 @@ class Drive:
     ) -> Outcome | None:
         """told: what the base tells of its (v m/s, w rad/s), else what it is told. heard: in every step."""
         for _ in range(round(seconds / PERIOD_S)):
-            if self.ending.outcome is not None:
+            if self.lifecycle.outcome is not None:
                 break
-            self.ending.begin(self.now_ns)
+            self.lifecycle.arm_once(self.now_ns)
             state = chassis_state(self.now_ns, mode, v_mps, reason=f"it is {mode.value}")
             if heard:
                 self.heard_ns = self.now_ns
             v_told, w_told = (v_mps, w_radps) if told is None else told
             state = replace(state, v_mps=v_told, w_radps=w_told, feedback_ns=self.heard_ns)
             setpoint = Setpoint(self.now_ns, v_mps, 0.0, w_radps)
-            self.ending.conclude(state, setpoint, self.now_ns, arrived=arrived)
+            self.lifecycle.check_end(state, setpoint, self.now_ns, arrived=arrived)
             self.now_ns += round(PERIOD_S * 1e9)
-        return self.ending.outcome
+        return self.lifecycle.outcome
 
 
 def test_the_chassis_is_armed_once_and_stopped_once() -> None:
@@ -57,18 +57,18 @@ def test_the_chassis_is_armed_once_and_stopped_once() -> None:
     drive.run(3.0)
     assert drive.chassis.stopped_at_ns == []
     drive.run(3.0, arrived=True)
-    assert drive.ending.outcome is Outcome.REACHED
+    assert drive.lifecycle.outcome is Outcome.REACHED
     assert drive.chassis.armed_at_ns == [0]
     assert drive.chassis.stopped_at_ns == [round((3.0 + SETTLE_S) * 1e9)]
 
 
 def test_rest_means_no_speed_and_no_turning() -> None:
     drive = Drive()
-    drive.ending.request_stop("asked", Outcome.STOPPED)
+    drive.lifecycle.request_stop("asked", Outcome.STOPPED)
     assert drive.run(2.0, w_radps=0.1) is None
     assert drive.run(2.0, v_mps=0.1) is None
     drive.run(2.0)
-    assert (drive.ending.outcome, drive.ending.stop_reason) == (Outcome.STOPPED, "asked")
+    assert (drive.lifecycle.outcome, drive.lifecycle.stop_reason) == (Outcome.STOPPED, "asked")
 
 
 def test_motion_in_between_begins_the_settling_anew() -> None:
@@ -79,18 +79,25 @@ def test_motion_in_between_begins_the_settling_anew() -> None:
 
 
 @pytest.mark.parametrize(
-    "told", [(1.1 * REST_MPS, 0.0), (-0.3, 0.0), (0.0, 1.1 * REST_RADPS), (0.0, -1.0), (math.nan, 0.0)]
+    "told",
+    [
+        (1.1 * MEASURED_REST_MPS, 0.0),
+        (-0.3, 0.0),
+        (0.0, 1.1 * MEASURED_REST_RADPS),
+        (0.0, -1.0),
+        (math.nan, 0.0),
+    ],
 )
 @pytest.mark.parametrize("arrived", [True, False])
 def test_a_base_that_still_moves_has_not_ended_the_drive(told: tuple[float, float], arrived: bool) -> None:
     drive = Drive()
     drive.run(1.0, v_mps=0.5)
     if not arrived:
-        drive.ending.request_stop("asked", Outcome.STOPPED)
+        drive.lifecycle.request_stop("asked", Outcome.STOPPED)
     assert drive.run(2.0, arrived=arrived, told=told) is None
     assert drive.run(SETTLE_S, arrived=arrived) is None, "it has stood for less than that"
     drive.run(PERIOD_S, arrived=arrived)
-    assert drive.ending.outcome is (Outcome.REACHED if arrived else Outcome.STOPPED)
+    assert drive.lifecycle.outcome is (Outcome.REACHED if arrived else Outcome.STOPPED)
 
 
 def test_feedback_from_before_the_stop_command_is_no_evidence_of_rest() -> None:
@@ -103,7 +110,8 @@ def test_feedback_from_before_the_stop_command_is_no_evidence_of_rest() -> None:
 def test_the_jitter_of_a_counter_is_rest() -> None:
     drive = Drive()
     drive.run(1.0, v_mps=0.5)
-    assert drive.run(1.0, arrived=True, told=(0.9 * REST_MPS, 0.9 * REST_RADPS)) is Outcome.REACHED
+    jitter = 0.9 * MEASURED_REST_MPS, 0.9 * MEASURED_REST_RADPS
+    assert drive.run(1.0, arrived=True, told=jitter) is Outcome.REACHED
 
 
 @pytest.mark.parametrize(
@@ -124,38 +132,38 @@ def test_a_base_that_goes_on_although_it_is_told_to_stand_is_a_fault(
     drive.run(1.0, v_mps=0.5)
     assert drive.run(REST_TIMEOUT_S, arrived=True, told=told) is None
     drive.run(PERIOD_S, arrived=True, told=told)
-    assert (drive.ending.outcome, drive.ending.stop_reason) == (Outcome.CHASSIS_FAULT, sentence)
+    assert (drive.lifecycle.outcome, drive.lifecycle.stop_reason) == (Outcome.CHASSIS_FAULT, sentence)
     assert len(drive.chassis.stopped_at_ns) == 1
 
 
 def test_a_fault_after_a_wish_to_stop_is_told_beside_it() -> None:
     drive = Drive()
     drive.run(1.0, v_mps=0.5)
-    drive.ending.request_stop("SIGTERM received", Outcome.STOPPED)
+    drive.lifecycle.request_stop("SIGTERM received", Outcome.STOPPED)
     drive.run(PERIOD_S, ChassisMode.ESTOP)
-    assert drive.ending.stop_reason == "SIGTERM received; then it is e-stop"
+    assert drive.lifecycle.stop_reason == "SIGTERM received; then it is e-stop"
 
 
 def test_a_wish_to_stop_before_the_base_is_armed_asks_for_no_speed() -> None:
     drive = Drive()
-    drive.ending.request_stop("perception is lost", Outcome.BROKEN_OFF)
+    drive.lifecycle.request_stop("perception is lost", Outcome.BROKEN_OFF)
     drive.run(1.0, ChassisMode.ARMING, told=(math.nan, math.nan), heard=False)
-    assert drive.ending.outcome is Outcome.BROKEN_OFF
+    assert drive.lifecycle.outcome is Outcome.BROKEN_OFF
 
 
 def test_the_first_wish_stays_and_arriving_counts_for_more() -> None:
     drive = Drive()
-    drive.ending.request_stop("the camera is gone", Outcome.BROKEN_OFF)
-    drive.ending.request_stop("SIGTERM received", Outcome.STOPPED)
+    drive.lifecycle.request_stop("the camera is gone", Outcome.BROKEN_OFF)
+    drive.lifecycle.request_stop("SIGTERM received", Outcome.STOPPED)
     drive.run(1.0, arrived=True)
-    assert (drive.ending.outcome, drive.ending.stop_reason) == (Outcome.REACHED, "the camera is gone")
+    assert (drive.lifecycle.outcome, drive.lifecycle.stop_reason) == (Outcome.REACHED, "the camera is gone")
 
 
 @pytest.mark.parametrize("mode", [ChassisMode.ESTOP, ChassisMode.LOST])
 def test_a_latched_chassis_ends_it_at_once_even_before_it_was_armed(mode: ChassisMode) -> None:
     drive = Drive()
     drive.run(PERIOD_S, mode)
-    assert (drive.ending.outcome, drive.ending.stop_reason) == (
+    assert (drive.lifecycle.outcome, drive.lifecycle.stop_reason) == (
         Outcome.CHASSIS_FAULT,
         f"it is {mode.value}",
     )
@@ -166,18 +174,18 @@ def test_a_chassis_that_disarms_itself_has_ended_the_drive() -> None:
     drive = Drive()
     drive.run(1.0, v_mps=0.5)
     drive.run(PERIOD_S, ChassisMode.STANDBY)
-    assert (drive.ending.outcome, drive.ending.stop_reason) == (Outcome.CHASSIS_FAULT, "it is standby")
+    assert (drive.lifecycle.outcome, drive.lifecycle.stop_reason) == (Outcome.CHASSIS_FAULT, "it is standby")
 
 
 def test_arming_is_waited_for_but_not_for_ever() -> None:
     drive = Drive()
     assert drive.run(ARM_TIMEOUT_S, ChassisMode.STANDBY) is None
     drive.run(1.0, ChassisMode.STANDBY)
-    assert (drive.ending.outcome, drive.ending.stop_reason) == (Outcome.NOT_ARMED, "it is standby")
+    assert (drive.lifecycle.outcome, drive.lifecycle.stop_reason) == (Outcome.NOT_ARMED, "it is standby")
 
 
 def test_how_long_arming_takes_is_up_to_the_driver() -> None:
     drive = Drive()
     assert drive.run(60.0, ChassisMode.ARMING) is None
     drive.run(PERIOD_S, ChassisMode.STANDBY)
-    assert (drive.ending.outcome, drive.ending.stop_reason) == (Outcome.NOT_ARMED, "it is standby")
+    assert (drive.lifecycle.outcome, drive.lifecycle.stop_reason) == (Outcome.NOT_ARMED, "it is standby")

@@ -7,10 +7,10 @@ import math
 import pytest
 
 from config.robot import Robot
-from controller.answer import Answer, BaseAnswer
 from controller.control import ControlStep
-from controller.ending import Outcome
+from controller.drive_lifecycle import Outcome
 from controller.record.tally import SetpointTally
+from controller.response_monitor import ResponseMonitor, SpeedCap
 from tests.support.imperfect_base import ImperfectBase
 from tests.support.obedient_chassis import PERIOD_S
 from tests.unit.controller.test_control import drive, loop_on
@@ -21,7 +21,7 @@ LIMITS = Robot().limits
 def driven(base: ImperfectBase, length_m: float = 6.0) -> tuple[list[ControlStep], Outcome | None]:
     """The steps of a whole drive, and its end."""
     loop = loop_on(base, length_m)
-    return drive(loop, 2500), loop.ending.outcome
+    return drive(loop, 2500), loop.lifecycle.outcome
 
 
 @pytest.mark.parametrize("deaf_for_s", [0.6, 0.8, 1.0])
@@ -116,17 +116,17 @@ NORMAL = {
 def test_whatever_a_base_is_like_its_commands_are_as_they_were(
     base: ImperfectBase, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """No answer of it ever caps a command, so they are bit for bit those of a loop that does not look."""
-    given: set[Answer] = set()
-    really = BaseAnswer.step
+    """No response of it ever caps a command, so they are bit for bit those of a loop that does not look."""
+    given: set[SpeedCap] = set()
+    really = ResponseMonitor.step
 
     def noted(
-        self: BaseAnswer, commanded_mps: float, measured_mps: float, feedback_ns: int | None, now_ns: int
-    ) -> Answer:
-        answer = really(self, commanded_mps, measured_mps, feedback_ns, now_ns)
-        given.add(answer)
-        return answer
+        self: ResponseMonitor, commanded_mps: float, measured_mps: float, feedback_ns: int | None, now_ns: int
+    ) -> SpeedCap:
+        cap = really(self, commanded_mps, measured_mps, feedback_ns, now_ns)
+        given.add(cap)
+        return cap
 
-    monkeypatch.setattr(BaseAnswer, "step", noted)
+    monkeypatch.setattr(ResponseMonitor, "step", noted)
     driven(base, 4.0)
-    assert given == {Answer()}
+    assert given == {SpeedCap()}
