@@ -133,6 +133,13 @@ class RoboteqChassis(ChassisDriver):
             self._pending_query, self._query_sent_ns = query, now_ns
         return sent
 
+    def _query(self, now_ns: int) -> None:
+        # A query is no command: it does not make motors run again that the watchdog has stopped.
+        if self._pending_query is None and now_ns >= self._quiet_until_ns:
+            query = next(self._queries)
+            self._link.write(query.line)
+            self._pending_query, self._query_sent_ns = query, now_ns
+
     def _send_stop(self, now_ns: int) -> None:
         self._feedback.forget_setup()
         self._setup = b""
