@@ -186,6 +186,7 @@ class ChassisDriver(ABC):
     def _query(self, now_ns: int) -> None:
         """Ask what is due, for a base that is only listened to and reports nothing by itself. Never a
         command. May raise LinkLost."""
+        del now_ns  # a base that reports by itself is asked nothing
 
     def _resettable(self) -> bool:
         """Whether the base keeps its stop cause until arming resets it."""
