@@ -26,8 +26,8 @@ _HERE = PlanarPose(0.0, 0.0, 0.0)
 _AT_START = OnPath(0.0, 0.0, 0.0)
 _AHEAD_M = np.column_stack([np.linspace(0.0, 10.0, 41), np.zeros(41)])
 
-# The camera's process imports, compiles and opens the camera in this time.
-_FIRST_FRAME_S = 30.0
+# The camera's process imports, compiles (at its first start) and opens the camera in this time.
+_FIRST_FRAME_S = 180.0
 
 
 class WatchLoop:

@@ -6,6 +6,7 @@ import math
 from dataclasses import fields, replace
 from typing import Self
 
+import numpy as np
 import pytest
 
 from config.app import load_app
@@ -16,9 +17,10 @@ from controller.watch.command import build_watch_loop
 from controller.watch.loop import WatchLoop
 from controller.watch.no_base import NoBase
 from hal.api import ChassisListener
-from hal.types import ChassisMode, ChassisState, PlanarPose
+from hal.geometry import camera_in_body, mount_of, wrap_angle_rad
+from hal.types import ChassisMode, ChassisState, PlanarPose, Pose
 from tests.support.scenes import chassis_state, obstacle, scene
-from vision.scene import Scene
+from vision.scene import EgoMotion, Scene
 
 MS = 1_000_000
 CONFIG = load_app(CONFIG_DIR / "sim-realtime.yaml")
@@ -98,7 +100,7 @@ def test_time_counts_from_the_first_frame_on() -> None:
 
 def test_a_camera_that_never_shows_anything_does_not_hold_it_up_for_ever() -> None:
     loop = loop_of(Pushed(), 2.0)
-    assert len(watched(loop, 60.0)) == 32 * 50 + 1
+    assert len(watched(loop, 200.0)) == 182 * 50 + 1
     assert loop.reason == "no frame came"
 
 
@@ -108,3 +110,30 @@ def test_it_ends_with_the_step_after_a_signal() -> None:
     loop.request_stop("later", Outcome.BROKEN_OFF)
     assert loop.finished
     assert (loop.outcome, loop.reason) == (Outcome.STOPPED, "SIGINT received")
+
+
+class Turned:
+    """hal.api.ChassisListener of a base that turns on the spot at 0.5 rad/s, by what it reports."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        return None
+
+    def listen(self, now_ns: int) -> ChassisState:
+        """As far as it has turned since time zero."""
+        heading_rad = wrap_angle_rad(0.5 * now_ns / 1e9)
+        return chassis_state(now_ns, ChassisMode.STANDBY, 0.0, PlanarPose(0.0, 0.0, heading_rad))
+
+
+def test_yaw_of_the_images_is_compared_with_that_of_the_odometry() -> None:
+    """The tracks slip: of every turn that they report, 80 % happen."""
+    to_body = camera_in_body(mount_of(CONFIG.robot)).rotation
+    c, s = math.cos(0.8 * 0.5 * 0.04), math.sin(0.8 * 0.5 * 0.04)
+    in_body = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    turning = Pose(to_body.T @ in_body @ to_body, np.zeros(3))
+    ego = EgoMotion(turning, 0.04, "visual", 0.9, 0.01, 0.001)
+    loop = loop_of(Turned())
+    watched(loop, 10.0, replace(scene(), ego_motion=ego))
+    assert loop.localiser.yaw_ratio == pytest.approx(0.8, abs=0.01)
