@@ -18,11 +18,12 @@ from config.chassis import (
 )
 from config.plant import PlantConfig
 from controller.guard import GuardedCanLink, GuardedChassis, GuardLimits
-from hal.api import CanLink, Chassis, SerialLink
+from hal.api import CanLink, Chassis, ChassisListener, SerialLink
 from hal.chassis.agilex import COMMANDS as AGILEX_COMMANDS
 from hal.chassis.agilex import AgilexChassis
 from hal.chassis.agilex_models import model_of
 from hal.chassis.agilex_serial import AgilexSerialBus
+from hal.chassis.driver import ChassisDriver
 from hal.chassis.kobuki import KobukiChassis
 from hal.chassis.roboclaw import RoboclawChassis
 from hal.chassis.roboteq import RoboteqChassis
@@ -48,6 +49,13 @@ def build_base(config: AppConfig, start: PlanarPose, start_ns: int) -> tuple[Cha
     return _guarded(config, driver), emulator
 
 
+def build_listener(
+    config: AppConfig, start: PlanarPose, start_ns: int
+) -> tuple[ChassisListener, Emulator | None]:
+    """The same, only to be listened to: what it returns can be neither armed nor commanded."""
+    return _bare_base(config, start, start_ns)
+
+
 def build_base_in_memory(
     config: AppConfig, start: PlanarPose, start_ns: int
 ) -> tuple[Chassis, Emulator, ScriptedCanLink | ScriptedSerialLink]:
@@ -62,7 +70,7 @@ def _guarded(config: AppConfig, driver: Chassis) -> Chassis:
     return GuardedChassis(driver, GuardLimits.of(config.robot.limits, period_s, max_age_s))
 
 
-def _bare_base(config: AppConfig, start: PlanarPose, start_ns: int) -> tuple[Chassis, Emulator | None]:
+def _bare_base(config: AppConfig, start: PlanarPose, start_ns: int) -> tuple[ChassisDriver, Emulator | None]:
     simulation, chassis, link = config.simulation, config.chassis, config.chassis.link
     plant = None
     if simulation is not None and simulation.base == "emulated":
@@ -78,7 +86,7 @@ def _bare_base(config: AppConfig, start: PlanarPose, start_ns: int) -> tuple[Cha
 
 def _in_memory(
     chassis: AnyChassisConfig, plant: TrackedPlant
-) -> tuple[Chassis, Emulator, ScriptedCanLink | ScriptedSerialLink]:
+) -> tuple[ChassisDriver, Emulator, ScriptedCanLink | ScriptedSerialLink]:
     if isinstance(chassis.link, CanLinkConfig):
         near, far = can_pair()
         return build_can_driver(chassis, near), _can_emulator(chassis, far, plant), near
@@ -86,13 +94,13 @@ def _in_memory(
     return build_serial_driver(chassis, here), build_serial_emulator(chassis, there, plant), here
 
 
-def build_can_driver(config: AnyChassisConfig, link: CanLink) -> Chassis:
+def build_can_driver(config: AnyChassisConfig, link: CanLink) -> ChassisDriver:
     """The driver on a CAN bus, which may send only the listed commands; without the output guard."""
     assert isinstance(config, AgilexChassisConfig), "the one kind that is reached over CAN"
     return AgilexChassis(GuardedCanLink(link, AGILEX_COMMANDS), config)
 
 
-def build_serial_driver(config: AnyChassisConfig, link: SerialLink) -> Chassis:
+def build_serial_driver(config: AnyChassisConfig, link: SerialLink) -> ChassisDriver:
     """The driver on a serial line; without the output guard."""
     match config:
         case AgilexChassisConfig():

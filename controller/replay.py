@@ -20,23 +20,22 @@ from controller.build_replay import build_replay_decision, build_replay_perceive
 from controller.decision.decide import DecisionMaker
 from controller.decision.decision import Decision
 from controller.decision.situation import Situation
+from controller.ego_speed import EgoSpeed
 from controller.errors import UserError
 from controller.path.path import OnPath, Path
 from controller.perceive import Look
 from controller.record.observations import STANDARD_OUTPUT
 from controller.record.recorder import RecordingOptions, open_recorder, require_two_files
-from controller.record.tally import TimingTally
+from controller.record.tally import ConditionTally, TimingTally
 from controller.terminal.console import Console
 from hal.cameras.bag_topics import WantedTopics
 from hal.clocks import NS_PER_S
 from hal.errors import EndOfStream
-from hal.geometry import camera_in_body, mount_of
+from hal.geometry import mount_of
 from hal.types import CameraMount, PlanarPose
-from vision.scene import CameraCondition, EgoMotion
 
 # The robot is at the origin in every frame: there is one decision a frame, at the time of that frame.
 _STANDING = PlanarPose(0.0, 0.0, 0.0)
-_SPEED_FRAMES = 5  # the speed is the median of this many frames
 # Outputs of an earlier replay in the recording's folder, which may be overwritten.
 _OUTPUTS = frozenset({".jsonl", ".json", ".webm", ".mp4", ".avi"})
 
@@ -66,8 +65,7 @@ class ReplayTally:
     ids: set[int] = field(default_factory=set)
     moving_ids: set[int] = field(default_factory=set)
     nearest_m: float = math.inf
-    conditions: Counter[CameraCondition] = field(default_factory=Counter)
-    reasons: Counter[str] = field(default_factory=Counter)
+    camera: ConditionTally = field(default_factory=ConditionTally)
     actions: Counter[str] = field(default_factory=Counter)
 
     def take(self, look: Look, decision: Decision) -> None:
@@ -81,25 +79,8 @@ class ReplayTally:
         self.moving_ids.update(obstacle.id for obstacle in look.scene.obstacles if obstacle.moving)
         for obstacle in look.scene.obstacles:
             self.nearest_m = min(self.nearest_m, float(obstacle.position_m[2]))
-        self.conditions[look.scene.health.condition] += 1
-        if look.scene.health.reason:
-            self.reasons[look.scene.health.reason] += 1
+        self.camera.add(look.scene.health)
         self.actions[decision.action.value] += 1
-
-
-class EgoSpeed:
-    """Forward speed of the robot that carries the camera: the median over the last frames' ego-motion."""
-
-    def __init__(self, mount: CameraMount | None) -> None:
-        self._to_body = camera_in_body(mount or CameraMount(0.0, 0.0, 0.0, 0.0)).rotation
-        self._recent_mps: list[float] = []
-
-    def step(self, ego: EgoMotion) -> float:
-        """The speed in m/s, never negative; 0 until something was measured."""
-        if ego.source != "none" and ego.dt_s > 0.0:
-            ahead_m = float((self._to_body @ ego.motion.translation_m)[0])
-            self._recent_mps = [*self._recent_mps[1 - _SPEED_FRAMES :], ahead_m / ego.dt_s]
-        return max(float(np.median(self._recent_mps)), 0.0) if self._recent_mps else 0.0
 
 
 def run_replay(options: ReplayOptions) -> None:
@@ -171,12 +152,6 @@ def _decide(decide: DecisionMaker, path: Path, look: Look, v_mps: float) -> Deci
     return decide.step(Situation(look.scene, path, _STANDING, on_path, v_mps, 0.0, look.scene.captured_ns))
 
 
-def _camera(tally: ReplayTally) -> str:
-    """Number of frames in each condition of the camera, and the most frequent reason for a bad one."""
-    worth = ", ".join(f"{count} {condition.value}" for condition, count in tally.conditions.items())
-    return "; mostly: ".join([worth, *(reason for reason, _ in tally.reasons.most_common(1))])
-
-
 def _counts(tally: ReplayTally) -> str:
     return ", ".join(f"{count} {action}" for action, count in sorted(tally.actions.items()))
 
@@ -225,7 +200,7 @@ def _summary(
             + (f"; nearest {tally.nearest_m:.2f} m ahead" if math.isfinite(tally.nearest_m) else ""),
         ),
         ("decisions", f"{_counts(tally)}; for a robot that drives straight ahead"),
-        ("camera", _camera(tally)),
+        ("camera", tally.camera.line()),
         ("perception", tally.timing.line()),
     ]
     rows.extend(("skipped", text) for text in skipped)

@@ -71,6 +71,15 @@ class Chassis(Device, Protocol):
         ...
 
 
+class ChassisListener(Device, Protocol):
+    """A base that is only listened to: it can be neither armed nor commanded."""
+
+    def listen(self, now_ns: int) -> ChassisState:
+        """Read what has arrived, and ask a base that reports nothing by itself. No command is sent, zero
+        included, also when the device is closed. What the base does is up to whoever drives it."""
+        ...
+
+
 class CanLink(Device, Protocol):
     """A link that carries whole CAN frames. It knows nothing about the chassis."""
 

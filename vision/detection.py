@@ -12,7 +12,7 @@ from hal.types import Intrinsics, Pose
 from vision.camera.health import worsened
 from vision.depth.depth_grid import DepthGrid
 from vision.motion.velocities import EndResiduals
-from vision.scene import CameraCondition, CameraHealth, EgoMotion
+from vision.scene import CameraCondition, CameraHealth, EgoMotion, SeenFloor
 
 # The ego-motion of a frame that was not compared with the one before.
 MOTION_NOT_KNOWN = EgoMotion(
@@ -45,6 +45,7 @@ class Detection:
     motion_known: the camera's own motion is known well enough to call anything else moving.
     reckoned: odometry supports that motion.
     blurred: few fragments fit one motion of the camera under the assumed noise; never with odometry.
+    floor: the newest look of the check of the mounting; None before the first, or without a mounting.
     """
 
     captured_ns: int
@@ -64,6 +65,7 @@ class Detection:
     motion_known: bool
     reckoned: bool
     blurred: bool
+    floor: SeenFloor | None = None
 
 
 def camera_health(health: CameraHealth, ego: EgoMotion, blurred: bool, reckoned: bool) -> CameraHealth:

@@ -283,6 +283,7 @@ class Detector:
             motion_known=motion_known,
             reckoned=reckoned,
             blurred=blurred,
+            floor=self._mount_check.floor,
         )
 
 

@@ -104,6 +104,22 @@ class CameraHealth:
     valid_depth_ratio: float
 
 
+@record(frozen=True, slots=True)
+class SeenFloor:
+    """Where one look has found the floor in the depth, whatever the mounting says.
+
+    captured_ns: of the frame.
+    camera_height_m: of the camera over this floor.
+    pitch_rad: of the camera over this floor; positive looks down.
+    roll_rad: positive: the camera's right side is lower.
+    """
+
+    captured_ns: int
+    camera_height_m: float
+    pitch_rad: float
+    roll_rad: float
+
+
 @record(frozen=True, slots=True, eq=False)
 class EgoMotion:
     """The camera's own motion between the frame before and this one.
@@ -161,6 +177,7 @@ class Scene:
     health: of the camera.
     robot_pose: the robot's body in the odometry frame at captured_ns, as perception used it; None without
         odometry.
+    floor: the newest look of the check of the mounting, which may be seconds old; None before the first one.
     """
 
     captured_ns: int
@@ -170,3 +187,4 @@ class Scene:
     ego_motion: EgoMotion
     health: CameraHealth
     robot_pose: PlanarPose | None
+    floor: SeenFloor | None = None

@@ -273,6 +273,7 @@ class Tracker:
             ego_motion=detection.ego_motion,
             health=detection.health,
             robot_pose=robot_pose,
+            floor=detection.floor,
         )
         index = tracks.index_of(owner)
         moving = np.concatenate((tracks.moving, [False]))[index]

@@ -1,11 +1,11 @@
 """The command line `treadwatch`: controller/__main__.py calls main() in commands.py.
 
-* commands.py - run, govern, replay, envelope, emulate; how errors are told
+* commands.py - run, watch, govern, replay, envelope, emulate; how errors are told
 * measuring.py - the commands that measure: bench, evaluate, campaign, stop-and-go, faults
 * options.py - options that several commands have in common
 * envelope.py - `treadwatch envelope`: what the robot can guarantee
 * emulate.py - `treadwatch emulate`: an emulated base in a process of its own
 
-Commands that need more than one file have a package: mission/, governor/, bench/, evaluation/, campaign/,
-faults/; `treadwatch replay` is controller/replay.py.
+Commands that need more than one file have a package: mission/, watch/, governor/, bench/, evaluation/,
+campaign/, faults/; `treadwatch replay` is controller/replay.py.
 """

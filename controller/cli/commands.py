@@ -50,6 +50,26 @@ def run(options: MissionOptions) -> None:
 
 
 @cli.command()
+@config_option("of robot, camera and chassis", CONFIG_DIR / "sim-realtime.yaml")
+@click.option(
+    "--for", "duration_s", type=WholeNumber(min=1), metavar="SECONDS", show_default="until Ctrl-C",
+    help="Watch for this long, from the first frame on.",
+)  # fmt: skip
+@click.option("--no-chassis", is_flag=True, help="Look through the camera alone; no base is opened.")
+@mission_options
+def watch(options: MissionOptions, duration_s: int | None, no_chassis: bool) -> None:
+    """Look and listen, without driving.
+
+    Prints once a second what the camera sees, where the floor is, what the robot would decide, and what the
+    base reports. The base is never armed, and no command is sent to it. Ends with Ctrl-C or SIGTERM.
+    Exit code 0 if it ended as asked and all files were written; else 1.
+    """
+    from controller.watch.command import WatchOptions, run_watch
+
+    sys.exit(run_watch(WatchOptions(options, duration_s, no_chassis)))
+
+
+@cli.command()
 @config_option(
     "with a `governor` section", CONFIG_DIR / "governor.yaml", "a simulated warehouse, commands over UDP"
 )

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import fields
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import Any, Literal, get_args
 
 import click
 
@@ -13,9 +14,6 @@ from config.camera import OdometryChoice
 from config.chassis import CHASSIS_KINDS
 from config.loader import CONFIG_DIR
 from controller.terminal.outlet import result_on_stdout
-
-if TYPE_CHECKING:
-    from controller.mission.result import MissionOptions
 
 
 class WholeNumber(click.IntRange):
@@ -104,15 +102,19 @@ def topic_options(command: Callable[..., None]) -> Callable[..., None]:
     )
 
 
-def mission_options(command: Callable[[MissionOptions], None]) -> Callable[..., None]:
-    """The options of a drive but --config, handed to the command as one MissionOptions."""
+def mission_options(command: Callable[..., None]) -> Callable[..., None]:
+    """The options of a drive and --config, handed to the command as one MissionOptions.
+
+    Other options of the command are passed on by name.
+    """
 
     @wraps(command)
     def with_options(**given: Any) -> None:
         # Imported here: `treadwatch --help` needs no NumPy.
         from controller.mission.result import MissionOptions
 
-        command(MissionOptions(**given))
+        of_mission = {each.name: given.pop(each.name) for each in fields(MissionOptions)}
+        command(MissionOptions(**of_mission), **given)
 
     return _in_this_order(
         recording_options(with_options),

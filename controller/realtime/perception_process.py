@@ -17,7 +17,7 @@ from controller.control import ControlStep
 from controller.errors import UserError, describe
 from controller.localise import PoseHistory
 from controller.realtime.channel import Channel, PeerGone
-from controller.realtime.runner import CutOff, Farewell, SceneMessage, StepMessage
+from controller.realtime.runner import STREAM_ENDED, CutOff, Farewell, SceneMessage, StepMessage
 from controller.record.recorder import RecordingOptions, RunRecorder, open_recorder
 from controller.terminal.outlet import say
 from hal.clocks import NS_PER_S, MonotonicClock
@@ -131,7 +131,7 @@ def perceive_forever(
     except PeerGone:
         return
     except EndOfStream:
-        _say_farewell(channel, "the camera's stream has ended")
+        _say_farewell(channel, STREAM_ENDED)
     except HalError as error:
         _say_farewell(channel, f"camera: {error}")
     except UserError as error:

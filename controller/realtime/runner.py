@@ -23,6 +23,9 @@ from hal.clocks import NS_PER_S
 from hal.types import PlanarPose
 from vision.scene import Scene
 
+# Reason of the farewell at the end of a recording that stands in for the camera.
+STREAM_ENDED = "the camera's stream has ended"
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SceneMessage:

@@ -1,9 +1,9 @@
-"""Statistics of a run: limits of the setpoints that were really sent, durations of stages, and frames."""
+"""Statistics of a run: limits of the setpoints that were really sent, durations of stages, camera, frames."""
 
 from __future__ import annotations
 
 import math
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -12,6 +12,7 @@ import numpy as np
 from config.robot import Limits
 from hal.clocks import NS_PER_S
 from hal.types import LATCHED_MODES, ChassisMode, Setpoint
+from vision.scene import CameraCondition, CameraHealth
 
 TOLERANCE = 1e-6
 # Maximum number of durations that are kept: one hour at 50 a second.
@@ -160,6 +161,25 @@ class TimingTally:
         stages = ", ".join(f"{stage} {np.median(values):.1f}" for stage, values in self.samples_ms.items())
         median_ms, p99_ms = np.median(total_ms), np.percentile(total_ms, 99)
         return f"{median_ms:.1f} ms median, {p99_ms:.1f} ms p99 a frame ({stages})"
+
+
+@dataclass
+class ConditionTally:
+    """How many frames the camera was in each condition, and why it was in a bad one."""
+
+    conditions: Counter[CameraCondition] = field(default_factory=Counter)
+    reasons: Counter[str] = field(default_factory=Counter)
+
+    def add(self, health: CameraHealth) -> None:
+        """Add one frame."""
+        self.conditions[health.condition] += 1
+        if health.reason:
+            self.reasons[health.reason] += 1
+
+    def line(self) -> str:
+        """The counts, and the most frequent reason for a bad condition."""
+        counts = ", ".join(f"{count} {condition.value}" for condition, count in self.conditions.items())
+        return "; mostly: ".join([counts, *(reason for reason, _ in self.reasons.most_common(1))])
 
 
 @dataclass

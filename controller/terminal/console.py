@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
+import shutil
 import sys
+import textwrap
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from itertools import chain, repeat
 
 from controller.decision.decision import Decision
 from controller.terminal.outlet import Outlet, Words, write
@@ -35,6 +38,7 @@ class Console:
         self._heard_at_s = 0.0
         self._stuck_told_s = 0.0
         self._stop_told = False
+        self._view_lines = 0
         self._write = write
 
     @contextmanager
@@ -54,6 +58,18 @@ class Console:
             done = round(BAR * min(max(share, 0.0), 1.0))
             bar = "#" * done + "." * (BAR - done)
             self._write(Words(f"\r\033[K[{bar}] {text[:90]}", to_stderr=True, whole=False))
+
+    def view(self, stamp_s: float, rows: list[tuple[str, str]]) -> None:
+        """What is known now, as (subject, text): on a terminal a block that is redrawn, else one line."""
+        if self._quiet:
+            return
+        if not (sys.stderr if self._aside else sys.stdout).isatty():
+            self.event(f"{stamp_s:7.2f} s  " + "  |  ".join(f"{name} {text}" for name, text in rows))
+            return
+        back = f"\033[{self._view_lines}A" if self._view_lines else ""
+        lines = _block(rows, shutil.get_terminal_size().columns - 1)
+        self._write(Words(f"{back}\r\033[J" + "\n".join(lines) + "\n", self._aside, whole=False))
+        self._view_lines = len(lines)
 
     def decision(self, stamp_s: float, decision: Decision, speed_mps: float) -> None:
         """One line whenever a new rule or obstacle has determined the speed for half a second."""
@@ -103,11 +119,13 @@ class Console:
         """Write a line that stays, unless quiet."""
         if not self._quiet:
             self._clear()
+            self._view_lines = 0
             self._write(Words(line, self._aside))
 
     def warning(self, line: str) -> None:
         """What the user should know before the drive: on standard error, even if quiet."""
         self._clear()
+        self._view_lines = 0
         self._write(Words(f"treadwatch: warning: {line}", to_stderr=True))
 
     def summary(self, rows: list[tuple[str, str]]) -> None:
@@ -120,3 +138,14 @@ class Console:
     def _clear(self) -> None:
         if self._live:
             self._write(Words("\r\033[K", to_stderr=True, whole=False))
+
+
+def _block(rows: list[tuple[str, str]], columns: int) -> list[str]:
+    """The rows as lines of at most this many columns; a long text goes on below its beginning."""
+    width = max(len(name) for name, _ in rows)
+    lines = []
+    for name, text in rows:
+        wrapped = textwrap.wrap(text, max(columns - width - 2, 20))
+        subjects = chain([name], repeat(""))
+        lines += [f"{subject:<{width}}  {part}" for subject, part in zip(subjects, wrapped, strict=False)]
+    return lines

@@ -195,6 +195,21 @@ def _refusal(state: Arming, evidence: Evidence, limits: ArmingLimits) -> str:
     return ""
 
 
+def listen(evidence: Evidence, limits: ArmingLimits) -> Arming:
+    """The state of a base that is only listened to: what is wrong with it now. Nothing is latched."""
+    if loss := _loss(evidence, limits):
+        return Arming(ChassisMode.LOST, loss, evidence.now_ns)
+    if evidence.stop_cause:
+        return Arming(ChassisMode.ESTOP, evidence.stop_cause, evidence.now_ns)
+    missing = [
+        f"no {what} heard from the base"
+        for what, stamp_ns in (("status", evidence.status_ns), ("motion feedback", evidence.feedback_ns))
+        if stamp_ns is None
+    ]
+    cause = ": ".join(filter(None, (missing[0], evidence.silence_hint))) if missing else "it answers"
+    return Arming(ChassisMode.STANDBY, cause, evidence.now_ns)
+
+
 def _loss(evidence: Evidence, limits: ArmingLimits) -> str:
     """Why the chassis counts as lost; "" if it does not. Feedback or status that never came is not a loss:
     arming waits for it."""

@@ -1,7 +1,8 @@
 """What all chassis drivers share: arming, a link that may be lost, and the final check of the command.
 
-A driver adds its protocol in four methods: _receive, _send, _send_stop and _begin_arming. The first three
-may raise LinkLost, which is handled here: exchange(), arm() and stop() never raise.
+A driver adds its protocol in four methods: _receive, _send, _send_stop and _begin_arming; one whose base only
+answers queries adds a fifth, _query. All but _begin_arming may raise LinkLost, which is handled here:
+exchange(), arm(), stop() and listen() never raise.
 """
 
 from __future__ import annotations
@@ -66,7 +67,7 @@ class ChassisFeedback(Protocol):
 
 
 class ChassisDriver(ABC):
-    """hal.api.Chassis without the protocol."""
+    """hal.api.Chassis and hal.api.ChassisListener without the protocol."""
 
     def __init__(
         self,
@@ -91,6 +92,7 @@ class ChassisDriver(ABC):
         self._link_error = ""
         self._retry_ns: int | None = None
         self._now_ns = 0
+        self._commanded = False
 
     def __enter__(self) -> Self:
         """Open the link. Raises DeviceNotFound, DeviceRefused."""
@@ -101,7 +103,8 @@ class ChassisDriver(ABC):
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         try:
-            self.stop(self._now_ns)
+            if self._commanded:  # else there is nothing to stop, or somebody else's drive
+                self.stop(self._now_ns)
         finally:
             self._device.__exit__(kind, error, trace)
 
@@ -109,6 +112,7 @@ class ChassisDriver(ABC):
         """See hal.api.Chassis. sent is the setpoint limited to what the base can do, before it is rounded to
         the resolution of the protocol."""
         self._now_ns = now_ns
+        self._commanded = True
         self._requested = setpoint
         self._setpoint_error = self._commands.setpoint_error(setpoint, now_ns)
         self._poll_link(now_ns)
@@ -125,6 +129,7 @@ class ChassisDriver(ABC):
     def arm(self, now_ns: int) -> None:
         """See hal.api.Chassis. The reason of a refusal is in the state's reason."""
         self._now_ns = now_ns
+        self._commanded = True
         # Read everything first: bytes of unknown age in the port must not count as an answer to this consent.
         input_overflow = all(self._poll_link(now_ns) for _ in range(_MAX_READS))
         before = self._arming.mode
@@ -141,6 +146,19 @@ class ChassisDriver(ABC):
             self._send_stop(now_ns)
         except LinkLost as error:
             self._handle_loss(error, now_ns)
+
+    def listen(self, now_ns: int) -> ChassisState:
+        """See hal.api.ChassisListener. For a driver that is never armed and never exchanges."""
+        self._now_ns = now_ns
+        self._poll_link(now_ns)
+        self._low_battery.step(self._reported.battery_v, now_ns)
+        if not self._link_error:
+            try:
+                self._query(now_ns)
+            except LinkLost as error:
+                self._handle_loss(error, now_ns)
+        self._arming = arming.listen(self._evidence(now_ns), self._limits)
+        return self._state(now_ns, None)
 
     @abstractmethod
     def _receive(self, now_ns: int) -> bool:
@@ -164,6 +182,11 @@ class ChassisDriver(ABC):
     @abstractmethod
     def _begin_arming(self) -> None:
         """Arming begins: forget what the base reported before about taking commands."""
+
+    def _query(self, now_ns: int) -> None:
+        """Ask what is due, for a base that is only listened to and reports nothing by itself. Never a
+        command. May raise LinkLost."""
+        del now_ns  # a base that reports by itself is asked nothing
 
     def _resettable(self) -> bool:
         """Whether the base keeps its stop cause until arming resets it."""

@@ -78,6 +78,7 @@ class RoboclawChassis(ChassisDriver):
         self._query_turn = False
         self._motion_acknowledged = True
         self._moving = False
+        self._listening_since_ns: int | None = None
 
     def _receive(self, now_ns: int) -> bool:
         received_before = self._port.bytes_received
@@ -114,6 +115,14 @@ class RoboclawChassis(ChassisDriver):
             self._port.start(next(self._queries), now_ns)
             return None
         return self._send_motion(command, now_ns)
+
+    def _query(self, now_ns: int) -> None:
+        # Not before the controller's time-out: queries would keep a base moving whose program has just died.
+        if self._listening_since_ns is None:
+            self._listening_since_ns = now_ns
+        waited = now_ns - self._listening_since_ns > self._limits.max_step_gap_ns
+        if waited and self._port.idle(now_ns):
+            self._port.start(next(self._queries), now_ns)
 
     def _send_stop(self, now_ns: int) -> None:
         # The zero does not wait for an answer that is under way; the controller takes packets in order.

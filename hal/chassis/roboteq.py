@@ -102,6 +102,11 @@ class RoboteqChassis(ChassisDriver):
         self._moving = not is_zero(command)
         return sent
 
+    def _query(self, now_ns: int) -> None:
+        # A query is no command: it does not make motors run again that the watchdog has stopped.
+        if self._port.idle(now_ns):
+            self._port.write(b"", next(self._queries), now_ns)
+
     def _send_stop(self, now_ns: int) -> None:
         self._feedback.forget_setup()
         self._setup = b""

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from vision.camera.floor import Floor, FloorFinder, cells_on
 from vision.camera.health import worsened
 from vision.depth.depth_grid import DepthGrid
-from vision.scene import CameraCondition, CameraHealth
+from vision.scene import CameraCondition, CameraHealth, SeenFloor
 
 # Interval of the looks at the floor; the longer one once all of the last looks have found it in its place.
 _OFTEN_NS, _RARELY_NS = 500_000_000, 5_000_000_000
@@ -42,9 +42,13 @@ _STILL_FLOOR = 0.5  # the mounting is right if its plane holds this share of the
 
 
 class MountCheck:
-    """Finds the floor in the depth at intervals, and compares it with the floor by the mounting."""
+    """Finds the floor in the depth at intervals, and compares it with the floor by the mounting.
+
+    floor: of the newest look that has found one; None before that.
+    """
 
     def __init__(self) -> None:
+        self.floor: SeenFloor | None = None
         self._looks: deque[_Look] = deque(maxlen=_LOOKS)
         self._next_ns: int | None = None
 
@@ -59,6 +63,7 @@ class MountCheck:
             floor = FloorFinder(_HEIGHTS_M).find(grid)
             if floor is not None:
                 self._looks.append(_look(grid, floor))
+                self.floor = _seen(floor, captured_ns)
             settled = len(self._looks) == _LOOKS and not any(look.off for look in self._looks)
             self._next_ns = captured_ns + (_RARELY_NS if settled else _OFTEN_NS)
         plain = [look for look in self._looks if look.plainly_off]
@@ -96,10 +101,19 @@ def _apart(one: Floor, other: Floor, bounds: _Bounds) -> bool:
     return tilt_rad > bounds.tilt_rad or abs(one.camera_height_m - other.camera_height_m) > bounds.height_m
 
 
+def _seen(floor: Floor, captured_ns: int) -> SeenFloor:
+    roll_rad = math.atan2(-float(floor.up[0]), -float(floor.up[1]))
+    return SeenFloor(captured_ns, floor.camera_height_m, _pitch_rad(floor), roll_rad)
+
+
+def _pitch_rad(floor: Floor) -> float:
+    return math.asin(min(max(-float(floor.up[2]), -1.0), 1.0))
+
+
 def _sentence(floor: Floor, grid: DepthGrid) -> str:
     ratio = floor.camera_height_m / grid.camera_height_m
     what = "its mounting" if 1.0 / _OTHER_UNIT < ratio < _OTHER_UNIT else "the unit of its depth"
-    pitch_deg = math.degrees(math.asin(min(max(-float(floor.up[2]), -1.0), 1.0)))
+    pitch_deg = math.degrees(_pitch_rad(floor))
     return (
         f"by the floor that it sees the camera is {floor.camera_height_m:.2f} m high and looks down by "
         f"{pitch_deg:.1f} degrees: is {what} right?"

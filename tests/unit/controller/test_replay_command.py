@@ -13,8 +13,9 @@ import pytest
 
 from config.app import load_app, load_replay
 from config.loader import CONFIG_DIR
+from controller.ego_speed import EgoSpeed
 from controller.errors import UserError
-from controller.replay import EgoSpeed, ReplayOptions, recorded_mount, run_replay
+from controller.replay import ReplayOptions, recorded_mount, run_replay
 from hal.cameras.tum_replay import TumReplay
 from hal.cameras.tum_writer import TumWriter
 from hal.types import Pose

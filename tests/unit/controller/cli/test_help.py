@@ -26,7 +26,7 @@ def test_every_option_says_what_it_does(name: str) -> None:
     assert [one.name for one in options if not one.help] == []
 
 
-@pytest.mark.parametrize("name", ["run", "govern", "replay"])
+@pytest.mark.parametrize("name", ["run", "watch", "govern", "replay"])
 def test_all_commands_offer_the_same_recordings(name: str) -> None:
     listed = [one.opts[0] for one in cli.commands[name].params]
     assert tuple(option for option in listed if option in RECORDED) == RECORDED

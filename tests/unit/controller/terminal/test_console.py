@@ -106,3 +106,29 @@ def test_why_the_robot_comes_to_rest_is_told_once(capsys: pytest.CaptureFixture[
     for step in range(3):
         console.stopping(14.6 + step * 0.02, 0.9, "SIGTERM received")
     assert capsys.readouterr().out.splitlines() == ["  14.60 s  0.90 m/s  stops     SIGTERM received"]
+
+
+def test_a_view_is_one_line_where_nobody_looks_at_a_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+    Console(quiet=False).view(3.0, [("camera", "good"), ("base", "standby")])
+    Console(quiet=True).view(3.0, [("camera", "good")])
+    Console(quiet=False, aside=True).view(4.0, [("camera", "good")])
+    out, err = capsys.readouterr()
+    assert out == "   3.00 s  camera good  |  base standby\n"
+    assert err == "   4.00 s  camera good\n"
+
+
+def test_on_a_terminal_a_view_is_redrawn_in_place_and_never_over_an_event(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
+    monkeypatch.setenv("COLUMNS", "31")
+    console = Console(quiet=False)
+    rows = [("camera", "good and a long text beside it"), ("base", "standby")]
+    shown = "\r\033[Jcamera  good and a long text\n        beside it\nbase    standby\n"
+    for back in ("", "\033[3A"):
+        console.view(1.0, rows)
+        assert capsys.readouterr().out == back + shown
+    console.warning("the disk is full")
+    capsys.readouterr()
+    console.view(2.0, rows)
+    assert capsys.readouterr().out == shown

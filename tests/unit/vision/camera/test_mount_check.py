@@ -109,3 +109,18 @@ def test_confirmed_mounting_is_checked_every_five_seconds() -> None:
     # Knocked askew: three looks, five seconds until the first of them, half a second to the others.
     assert judged(*[floor(20.0)] * 11, check=check, first=5) is GOOD
     assert judged(*[floor(20.0)] * 20, check=check, first=16).condition is CameraCondition.DEGRADED
+
+
+def test_newest_floor_is_told_with_height_pitch_and_roll_wherever_it_is() -> None:
+    check = MountCheck()
+    assert check.floor is None
+    leaning = up(7.0)
+    roll_rad = math.radians(3.0)  # to its right: the world's up leans to the left of the image
+    leaning[0], leaning[1] = leaning[1] * math.sin(roll_rad), leaning[1] * math.cos(roll_rad)
+    judged(floor(4.0), plane(leaning, 0.52), no_depth(), check=check)
+    found = check.floor
+    assert found is not None
+    assert found.captured_ns == HALF_S, "the last look has found none"
+    assert found.camera_height_m == pytest.approx(0.52, abs=0.005)
+    assert math.degrees(found.pitch_rad) == pytest.approx(7.0, abs=0.1)
+    assert math.degrees(found.roll_rad) == pytest.approx(3.0, abs=0.1)
