@@ -23,6 +23,7 @@ from controller.record.output_isolation import OutputIsolation
 from controller.terminal.outlet import say
 from controller.video.compose import Composer
 from controller.video.moment import VideoMoment
+from controller.video.pace import PacedVideo
 from controller.video.writer import VideoWriter
 from hal.cameras.tum_writer import TumWriter
 from hal.geometry import body_in_floor
@@ -69,7 +70,7 @@ class Recorder:
     def __init__(
         self,
         observations: ObservationFile | None,
-        video: VideoWriter | None,
+        video: PacedVideo | None,
         frames: FrameRecorder | None,
         surroundings: Surroundings,
         timed: bool,
@@ -119,7 +120,7 @@ class Recorder:
                 surroundings.corridor_half_width_m,
             )
             with self._isolation.guard(video):
-                video.write(self._composer.compose(moment))
+                video.write(self._composer.compose(moment), look.frame.captured_ns)
 
 
 def require_two_files(observations: FilePath | None, video: FilePath | None) -> None:
@@ -156,7 +157,10 @@ def open_recorder(
         if options.observations is not None:
             observations = files.enter_context(output_isolation.open(ObservationFile(options.observations)))
         if options.video is not None:
-            video = files.enter_context(output_isolation.open(VideoWriter(options.video, surroundings.fps)))
+            encoder = VideoWriter(options.video, surroundings.fps)
+            # A replay waits for the encoder; a drive in real time must not.
+            paced = PacedVideo(encoder, surroundings.fps, may_drop=cut_off is not None)
+            video = files.enter_context(output_isolation.open(paced))
         if options.frames is not None:
             writer = files.enter_context(TumWriter(options.frames, surroundings.mount))
             recorder = FrameRecorder(writer, options.frames, may_drop=options.timed)
