@@ -111,7 +111,7 @@ def report_lines(summary: Summary, command: str, driven: list[list[str]]) -> lis
     lines += markdown.section(
         "Families",
         """An arrow above a bar: the median drive took longer than the figure shows, or never arrived. No bar:
-        there is no time to compare, since something stands in the way for good, or it is below the axis.""",
+        there is no time to compare, since something stands in the way for good.""",
     )
     lines += markdown.picture("Median time by family", "families.png")
     lines += _family_table(summary)
@@ -147,11 +147,8 @@ def _family_table(summary: Summary) -> list[str]:
         [str(number), family, *(cell(by_policy[policy]) for policy in summary.policies)]
         for number, (family, by_policy) in enumerate(summary.families.items(), start=1)
     ]
-    lines = [
-        "Median time over the oracle's, and reached of those that should be; everything else is in summary.json.",
-        "",
-    ]
-    return lines + markdown.table(("", "family", *summary.policies), rows)
+    what = "Median time over the oracle's, and reached of those that should be; the rest is in summary.json."
+    return [what, "", *markdown.table(("", "family", *summary.policies), rows)]
 
 
 def _not_at_fault(summary: Summary) -> list[list[str]]:
