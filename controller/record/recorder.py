@@ -33,6 +33,8 @@ from hal.types import CameraMount, FloatArray, PlanarPose
 PATH_SHOWN_M = 12.0
 PATH_STEP_M = 0.25
 
+# Frame rate of the video of a drive in real time: two cores that also perceive encode no more in VP8.
+MAX_REAL_TIME_FPS = 10.0
 # Half a second of a camera with 90 frames a second: no decision uses an older scene.
 MAX_WAITING = 45
 
@@ -161,9 +163,10 @@ def open_recorder(
         if options.observations is not None:
             observations = files.enter_context(output_isolation.open(ObservationFile(options.observations)))
         if options.video is not None:
-            encoder = VideoWriter(options.video, surroundings.fps)
             # A replay waits for the encoder; a drive in real time must not.
-            paced = PacedVideo(encoder, surroundings.fps, may_drop=cut_off is not None)
+            in_real_time = cut_off is not None
+            fps = min(surroundings.fps, MAX_REAL_TIME_FPS) if in_real_time else surroundings.fps
+            paced = PacedVideo(VideoWriter(options.video, fps), fps, may_drop=in_real_time)
             video = files.enter_context(output_isolation.open(paced))
         if options.frames is not None:
             writer = files.enter_context(TumWriter(options.frames, surroundings.mount))

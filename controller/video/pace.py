@@ -13,8 +13,10 @@ from hal.clocks import NS_PER_S
 
 # A longer gap between two pictures is shown this long: a recording may pause for hours.
 MAX_STILL_S = 5.0
-# Maximum number of pictures that wait to be encoded, 2.8 MB each.
-_MAX_WAITING = 8
+# Maximum number of pictures that wait to be encoded, 2.8 MB each, and of pictures that they stand for. VP8
+# takes 25 ms for a repeated picture and 140 ms for a new one, and a drive that has ended waits for a few
+# seconds only.
+_MAX_WAITING, _MAX_WAITING_DUE = 8, 20
 
 
 class Pace:
@@ -59,7 +61,7 @@ class PacedVideo:
 
     def __init__(self, video: VideoWriter, fps: float, may_drop: bool) -> None:
         self._video, self._pace, self._may_drop = video, Pace(fps), may_drop
-        self._waiting: deque[Future[None]] = deque()
+        self._waiting: deque[tuple[Future[None], int]] = deque()
         self._thread: ThreadPoolExecutor | None = None
         self._last: Image | None = None
         self._failed = False
@@ -87,11 +89,12 @@ class PacedVideo:
         be written."""
         assert self._thread is not None
         self._collect(len(self._waiting) if self._may_drop else _MAX_WAITING - 1)
-        if len(self._waiting) >= _MAX_WAITING:
+        busy = sum(due for _, due in self._waiting) >= _MAX_WAITING_DUE
+        if self._may_drop and (busy or len(self._waiting) >= _MAX_WAITING):
             return
         due = self._pace.due(stamp_ns)
         if due:
-            self._waiting.append(self._thread.submit(self._encode, picture, due))
+            self._waiting.append((self._thread.submit(self._encode, picture, due), due))
 
     def _encode(self, picture: Image, due: int) -> None:
         if self._failed:  # the video ends, rather than have a gap
@@ -109,5 +112,5 @@ class PacedVideo:
     def _collect(self, max_waiting: int) -> None:
         """Wait until at most max_waiting pictures are waiting. Raises VideoError if one could not be
         written."""
-        while self._waiting and (self._waiting[0].done() or len(self._waiting) > max_waiting):
-            self._waiting.popleft().result()
+        while self._waiting and (self._waiting[0][0].done() or len(self._waiting) > max_waiting):
+            self._waiting.popleft()[0].result()

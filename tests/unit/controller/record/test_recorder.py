@@ -1,5 +1,6 @@
 import gc
 import json
+import time
 import weakref
 from pathlib import Path as FilePath
 
@@ -169,3 +170,17 @@ def test_the_last_frames_have_the_last_speeds_and_the_ending(monkeypatch: pytest
     run_recorder.add_look(eyes.look(camera.read(0.0)))
     run_recorder.finish("target reached")
     assert recorded == [(None, step.setpoint.v_mps, step.chassis.v_mps, "target reached")]
+
+
+def test_a_drive_in_real_time_has_a_video_of_fewer_pictures_and_the_same_length(tmp_path: FilePath) -> None:
+    found = []
+    for cut_off in (None, print):
+        path = tmp_path / "v.avi"
+        with open_recorder(RecordingOptions(video=path), AROUND, cut_off) as recorder:
+            for captured_ns in range(0, 1_000_000_000, 200_000_000):
+                recorder.record(EmptyScenePerceiver().look(frame(0, captured_ns)), None)
+                time.sleep(0.05)
+        video = cv2.VideoCapture(str(path))
+        found.append((video.get(cv2.CAP_PROP_FPS), video.get(cv2.CAP_PROP_FRAME_COUNT)))
+        video.release()
+    assert found == [(30.0, 25.0), (10.0, 9.0)]

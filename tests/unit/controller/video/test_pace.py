@@ -82,6 +82,24 @@ def test_a_slow_encoder_is_not_waited_for_in_real_time(
     assert written == list(range(8))
 
 
+def test_what_waits_is_bounded_by_what_it_takes_to_encode(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Slow pictures stand for many: few of them may wait, or the file is not closed in time."""
+    may_go_on, written = Event(), []
+
+    def write(_video: VideoWriter, picture: Image) -> None:
+        may_go_on.wait(10.0)
+        written.append(picture)
+
+    monkeypatch.setattr(VideoWriter, "write", write)
+    with PacedVideo(VideoWriter(tmp_path / "v.avi", FPS), FPS, may_drop=True) as video:
+        for stamp_ns in stamps_ns(3.0, 20):
+            video.write(grey(9), stamp_ns)
+        may_go_on.set()
+    assert len(written) == 1 + 10 + 10
+
+
 def test_a_failure_is_told_and_nothing_is_written_after_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
