@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
@@ -253,8 +254,10 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
     if given.suffix in {".yaml", ".yml"}:
         return load(given, Scenario)
     if len(given.parts) != 1 or given.name not in scenario_names():
+        close = get_close_matches(given.name, scenario_names(), n=1)
+        meant = f"did you mean {close[0]}? Else " if close else ""
         raise ConfigError(
-            f"{name_or_path}: there is no such scenario; give a YAML file or one of: "
+            f"{name_or_path}: there is no such scenario; {meant}give a YAML file or one of: "
             f"{', '.join(scenario_names())}"
         )
     return load(SCENARIO_DIR / f"{given.name}.yaml", Scenario)

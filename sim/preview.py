@@ -17,15 +17,23 @@ from config.robot import Robot
 from config.scenario import load_scenario
 from hal.clocks import NS_PER_S, SimulatedClock
 from hal.geometry import advance_pose, mount_of
-from hal.types import ColourImage, PlanarPose, RgbdFrame
+from hal.types import ColourImage, FloatArray, PlanarPose, RgbdFrame
 from sim.contact import robot_footprint
 from sim.rendering.camera import SimulatedCamera
 from sim.rendering.render import Picture
 from sim.world import World
 
 _MAX_DEPTH_M = 10.0
-_MAP_PX = (848, 480)
-_INK = (60, 60, 60)
+_MAP_PX = (848, 456)  # with the key below: the camera's 848 x 480
+_KEY_PX = 24
+_INK, _PAPER = (60, 60, 60), (235, 235, 235)
+_PATH, _MOVER, _STANDING, _ROBOT = (60, 160, 60), (40, 40, 210), (150, 120, 90), (200, 120, 40)
+_MEANINGS = (
+    ("path", _PATH), ("robot", _ROBOT), ("stands", _STANDING),
+    ("moves: dots each 0.5 s, line: in 1 s", _MOVER),
+)  # fmt: skip
+# Routes are shown for this long from the start.
+_ROUTE_S, _ROUTE_STEP_S = 30.0, 0.5
 
 
 class _Mistake(click.ClickException):
@@ -93,12 +101,27 @@ def sheet(frame: RgbdFrame, picture: Picture, world: World, robot: Robot, pose: 
 
 
 def depth_colours(frame: RgbdFrame) -> ColourImage:
-    """Depth in colours: near is blue, far is red, no data is black."""
+    """Depth in the colours of the video (viridis), with a scale: near is bright, far is dark, no data is
+    black."""
     metres = frame.depth * frame.depth_scale_m
-    grey = np.clip(metres / _MAX_DEPTH_M * 255.0, 0, 255).astype(np.uint8)
-    colours = np.asarray(cv2.applyColorMap(grey, cv2.COLORMAP_TURBO), dtype=np.uint8)
+    colours = _viridis(np.asarray(metres / _MAX_DEPTH_M, np.float64))
     colours[frame.depth == 0] = 0
+    height, width = frame.depth.shape
+    colours[height - 34 :] = 0
+    colours[height - 30 : height - 20, 10 : width - 10] = _viridis(np.linspace(0.0, 1.0, width - 20)[None])
+    for share in (0.0, 0.5, 1.0):
+        _write(colours, f"{share * _MAX_DEPTH_M:g} m", round(8 + share * (width - 52)), height - 6, _PAPER)
     return colours
+
+
+def _viridis(shares: FloatArray) -> ColourImage:
+    """0: near, bright; 1: far, dark."""
+    levels = np.rint(255.0 * (1.0 - np.clip(shares, 0.0, 1.0))).astype(np.uint8)
+    return np.asarray(cv2.applyColorMap(levels, cv2.COLORMAP_VIRIDIS), dtype=np.uint8)
+
+
+def _write(image: ColourImage, words: str, x: int, y: int, colour: tuple[int, int, int] = _INK) -> None:
+    cv2.putText(image, words, (x, y), cv2.FONT_HERSHEY_SIMPLEX, 0.4, colour, 1, cv2.LINE_AA)
 
 
 def mask_colours(mask: NDArray[np.uint16]) -> ColourImage:
@@ -111,7 +134,8 @@ def mask_colours(mask: NDArray[np.uint16]) -> ColourImage:
 
 
 def _map(world: World, robot: Robot, pose: PlanarPose, t_s: float) -> ColourImage:
-    """The scene from above: walls, path, the robot, and each body with its name and its way in one second."""
+    """The scene from above: walls, path, the robot, and each body with its name, its route and its way in one
+    second; below them a scale and a legend."""
     room = world.scenario.room
     width, height = _MAP_PX
     scale = min(width / (room.x_max_m - room.x_min_m), height / (room.y_max_m - room.y_min_m))
@@ -127,17 +151,44 @@ def _map(world: World, robot: Robot, pose: PlanarPose, t_s: float) -> ColourImag
     length = world.scenario.path.length_m
     stations = [pose_along(world.scenario.path, s) for s in np.linspace(0.0, length, 200)]
     route = pixels(np.array([[p.x_m, p.y_m] for p in stations]))
-    cv2.polylines(plan, [route], False, (60, 160, 60), 2, cv2.LINE_AA)
+    cv2.polylines(plan, [route], False, _PATH, 2, cv2.LINE_AA)
+    for places_m in _routes(world):
+        for place in pixels(places_m):
+            cv2.circle(plan, place.tolist(), 1, _MOVER, -1, cv2.LINE_AA)
     for state in world.bodies(t_s):
-        colour = (40, 40, 210) if state.moves else (150, 120, 90)
+        colour = _MOVER if state.moves else _STANDING
         cv2.polylines(plan, [pixels(state.footprint_m)], True, colour, 1, cv2.LINE_AA)
         here = np.array([[state.pose.x_m, state.pose.y_m]])
         ends = pixels(np.concatenate([here, here + state.velocity_mps]))
         cv2.line(plan, tuple(ends[0].tolist()), tuple(ends[1].tolist()), colour, 2, cv2.LINE_AA)
-        beside = (ends[0] + (6, -6)).tolist()
-        cv2.putText(plan, state.name, beside, cv2.FONT_HERSHEY_SIMPLEX, 0.4, _INK, 1, cv2.LINE_AA)
-    cv2.fillConvexPoly(plan, pixels(robot_footprint(robot.body, pose)), (200, 120, 40), cv2.LINE_AA)
-    return plan
+        _write(plan, state.name, *(ends[0] + (6, -6)).tolist())
+    cv2.fillConvexPoly(plan, pixels(robot_footprint(robot.body, pose)), _ROBOT, cv2.LINE_AA)
+    return np.vstack([plan, _map_key(width, scale)]).astype(np.uint8)
+
+
+def _routes(world: World) -> list[FloatArray]:
+    """Where each mover is at each half second, (T, 2)."""
+    times_s = np.arange(0.0, _ROUTE_S, _ROUTE_STEP_S)
+    states = [[state for state in world.bodies(t_s) if state.moves] for t_s in times_s.tolist()]
+    return [
+        np.array([[state.pose.x_m, state.pose.y_m] for state in of_one])
+        for of_one in zip(*states, strict=True)
+    ]
+
+
+def _map_key(width: int, px_per_m: float) -> ColourImage:
+    """The scale of the map, and what its colours mean."""
+    key = np.full((_KEY_PX, width, 3), 235, np.uint8)
+    length_m = next(m for m in (10, 5, 2, 1) if m * px_per_m < 0.3 * width or m == 1)
+    cv2.line(key, (10, 12), (10 + round(length_m * px_per_m), 12), _INK, 3)
+    x = 18 + round(length_m * px_per_m)
+    _write(key, f"{length_m} m", x, 16)
+    x += 56
+    for words, colour in _MEANINGS:
+        cv2.rectangle(key, (x, 6), (x + 12, 18), colour, -1)
+        _write(key, words, x + 17, 16)
+        x += 34 + 8 * len(words)
+    return key
 
 
 if __name__ == "__main__":

@@ -89,7 +89,8 @@ def _drive(
         devices.enter_context(simulation)
         devices.enter_context(chassis)
         devices.enter_context(camera)
-        recorder = RunRecorder(devices.enter_context(open_recorder(options, surroundings(config))), path)
+        files = devices.enter_context(open_recorder(options, surroundings(config)))
+        recorder = RunRecorder(files, path, loop.localiser)
         perceiver = build_perceiver(config, loop.localiser, loop.localiser.body_pose, time.perf_counter_ns)
         monitor = _ProgressMonitor(stage, simulation, log)
         for moment in run_lockstep(
@@ -105,7 +106,8 @@ def _drive(
             log.setpoints.add(moment.control.chassis.sent, moment.control.chassis.mode)
             if monitor.given_up:
                 break
-        recorder.finish()
+        outcome = loop.lifecycle.outcome
+        recorder.finish("drive ended" if outcome is None else outcome.value)
     if loop.lifecycle.outcome is Outcome.REACHED:
         log.reached_s = log.times_s[-1] - SETTLE_S - monitor.armed_s
     return log

@@ -36,6 +36,7 @@ class CampaignOptions:
     families: empty means all of them, or none where scenarios are given.
     policies: empty means all of them.
     only: FAMILY:SEED or FILE:SEED, a single mission.
+    video: keep recordings and videos of the missions that fail; of a single mission in any case.
     scenarios: of the user's own: files, or names of those that ship.
     """
 
@@ -72,7 +73,8 @@ def run_campaign(options: CampaignOptions) -> int:
     keep_own(options.report, own, {row.family for row in store.rows.values()})
     keep = options.report / FAILING if options.video else None
     tasks = []
-    for mission in missions(options.missions, families, options.seed):
+    named = list(missions(options.missions, families, options.seed))
+    for mission in named:
         missing_policies = tuple(
             name for name in policies if (mission.family, mission.seed, name) not in store.rows
         )
@@ -91,6 +93,13 @@ def run_campaign(options: CampaignOptions) -> int:
         options.report, store.rows.values(), command_line(options), kept_scenarios(options.report)
     )
     _print_summary(summary, len(tasks), time.perf_counter() - began_s, options.report)
+    earlier = {(row.family, row.seed) for row in store.rows.values()}
+    earlier -= {(mission.family, mission.seed) for mission in named}
+    if earlier:
+        say(
+            f"note     the folder holds {len(earlier)} missions more than this command asks for; "
+            "they are in the report, too"
+        )
     return int(any(failed(row) for row in store.rows.values() if row.policy == OURS))
 
 

@@ -31,6 +31,8 @@ class Row:
 
     expected: whether the target should be reached at all.
     touched: names of the bodies of contacts at fault.
+    touched_not_at_fault, touched_at_mps: names of the bodies of the other contacts, and the robot's speed at
+        each. Rows of earlier versions have neither.
     time_s: until rest on the target; None if it was not reached.
     min_clearance_m: inf if there is nothing to come near to.
     oracle_time_s: None if not even the oracle reaches the target.
@@ -54,6 +56,8 @@ class Row:
     limit_violations: int
     false_stops: int
     flaps: int
+    touched_not_at_fault: tuple[str, ...] = ()
+    touched_at_mps: tuple[float, ...] = ()
 
     def as_dict(self) -> dict[str, object]:
         """The row as a dictionary for JSON, which has no infinity: null."""
@@ -81,6 +85,7 @@ def judge(stage: Stage, log: DriveLog, policy: str, mode: str, reference: JudgeR
         for contact in contacts
         if at_fault(contact, stage, log, reference.planar_camera, reference.reaction_s)
     ]
+    blameless = [contact for contact in contacts if contact not in faulty]
     return Row(
         family=case.family,
         seed=case.seed,
@@ -100,6 +105,8 @@ def judge(stage: Stage, log: DriveLog, policy: str, mode: str, reference: JudgeR
         limit_violations=tally.violations,
         false_stops=len(false_stops(stage, log)),
         flaps=flaps(log),
+        touched_not_at_fault=tuple(stage.world.names[contact.body] for contact in blameless),
+        touched_at_mps=tuple(round(contact.v_mps, 3) for contact in blameless),
     )
 
 

@@ -111,12 +111,18 @@ def report_lines(summary: Summary, command: str, driven: list[list[str]]) -> lis
     lines += markdown.section(
         "Families",
         """An arrow above a bar: the median drive took longer than the figure shows, or never arrived. No bar:
-        there is no time to compare, since something stands in the way for good, or it is below the axis.""",
+        there is no time to compare, since something stands in the way for good.""",
     )
     lines += markdown.picture("Median time by family", "families.png")
-    for number, (family, by_policy) in enumerate(summary.families.items(), start=1):
-        lines += [f"### {number}. {family}", ""]
-        lines += markdown.table(_HEADER, [[name, *_cells(one)] for name, one in by_policy.items()])
+    lines += _family_table(summary)
+    lines += markdown.section(
+        "Contacts that were not at fault",
+        """At fault is a contact at which the robot moved and that a driver with the same field of view and
+        reaction avoids; all others are listed here: somebody walked into the robot, or stepped out of what
+        nobody could see. A negative clearance is how deep both outlines overlap at the deepest moment, since
+        a simulated body does not stop at a contact.""",
+    )
+    lines += markdown.table(("mission", "policy", "body", "robot's speed m/s"), _not_at_fault(summary))
     lines += markdown.section(
         "What failed",
         "Each can be driven again alone: `treadwatch campaign --only FAMILY:SEED`, or `FILE.yaml:SEED`.",
@@ -128,6 +134,28 @@ def report_lines(summary: Summary, command: str, driven: list[list[str]]) -> lis
     if len(summary.failing) > _MAX_FAILED_ROWS:
         lines += [f"... and {len(summary.failing) - _MAX_FAILED_ROWS} more: see summary.json.", ""]
     return lines
+
+
+def _family_table(summary: Summary) -> list[str]:
+    """One row a family, one column a policy."""
+
+    def cell(one: Totals) -> str:
+        text = f"{number_or_never(one.ratio_median)}, {one.reached}/{one.expected}"
+        return text + (f", {one.contacts_at_fault} at fault" if one.contacts_at_fault else "")
+
+    rows = [
+        [str(number), family, *(cell(by_policy[policy]) for policy in summary.policies)]
+        for number, (family, by_policy) in enumerate(summary.families.items(), start=1)
+    ]
+    what = "Median time over the oracle's, and reached of those that should be; the rest is in summary.json."
+    return [what, "", *markdown.table(("", "family", *summary.policies), rows)]
+
+
+def _not_at_fault(summary: Summary) -> list[list[str]]:
+    return [
+        [f"{family}:{seed}", policy, body, f"{v_mps:.2f}"]
+        for family, seed, policy, body, v_mps in summary.not_at_fault
+    ]
 
 
 _DRIVEN_HEADER = ("name", "what", "seeds", "missions")

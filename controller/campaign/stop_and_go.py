@@ -53,10 +53,12 @@ class StopAndGo:
 
     to_stop_s: from when the free way is no longer than a comfortable stop needs (the last such moment before
         it stands) until it stands.
-    braking_s: the part of to_stop_s that the braking itself needs.
+    braking_s: reference for to_stop_s: a comfortable stop from that speed, without acceleration before it.
+        A robot that began earlier takes less.
     hold_share: share of the time for which the stop is held.
     to_resume_s: from when the way is free until 0.10 m/s.
-    starting_s: the part of to_resume_s that the jerk limit needs.
+    starting_s: reference for to_resume_s: from rest to 0.10 m/s at the jerk limit. A robot that began before
+        the way was free takes less.
     to_decide_s: from when the way is free until the decision is to go faster.
     false_stop_share: share of the time for which the robot stands without a reason.
     """

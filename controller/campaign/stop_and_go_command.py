@@ -81,6 +81,9 @@ def run_stop_and_go(options: StopAndGoOptions) -> int:
     if options.keep and options.mode != "camera":
         raise UserError("--keep needs --mode camera: without a camera there are no frames to keep")
     folder = options.report / "drives"
+    for earlier in (folder, options.report / "report.md"):
+        if earlier.exists():
+            raise UserError(f"{earlier} exists: give another --report folder, or remove it")
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -133,12 +136,15 @@ def _write(options: StopAndGoOptions, results: dict[int, StopAndGo]) -> None:
     lines += markdown.section(
         "Nav2's bag metrics",
         """A person steps into the way, stands, and leaves it. Stopped is 0.02 m/s, driving 0.10 m/s, three
-        samples in a row. A stop is due from when the free way is no longer than a comfortable stop needs;
-        braking is what the stop from that speed takes by physics, starting what the jerk limit takes to
-        0.10 m/s. Decided: until the decision says faster.""",
+        samples in a row. A stop is due from when the free way is no longer than a comfortable stop needs.
+        Decided: until the decision says faster.""",
+        """Two references come from physics alone: a comfortable stop from the speed at which the stop is due,
+        at constant speed until then, down to 0 m/s; and a start from rest to 0.10 m/s at the jerk limit. The
+        targets hold for what is beyond them. They are no parts of the measured times: the robot may have
+        begun before the stop was due, or before the way was free, and then beyond is less or negative.""",
     )
     head = (
-        "seed", "to stop s", "of that braking s", "hold", "to resume s", "of that starting s", "decided s",
+        "seed", "to stop s", "comfortable stop s", "hold", "to resume s", "start from rest s", "decided s",
         "false stops",
     )  # fmt: skip
     lines += markdown.table(head, [[str(seed), *_cells(result)] for seed, result in results.items()])

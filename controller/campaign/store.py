@@ -131,9 +131,13 @@ def parse_row(values: dict[str, object]) -> Row:
     """A row from its JSON object. Raises TypeError if it is not a row."""
     if not isinstance(values, dict):
         raise TypeError("no object")
-    touched = values.get("touched", [])
-    if not isinstance(touched, list):
-        raise TypeError("touched is no list")
+    lists: dict[str, object] = {}
+    for key in ("touched", "touched_not_at_fault", "touched_at_mps"):
+        if key in values:
+            content = values[key]
+            if not isinstance(content, list):
+                raise TypeError(f"{key} is no list")
+            lists[key] = tuple(content)
     if "min_clearance_m" in values and values["min_clearance_m"] is None:
         values = {**values, "min_clearance_m": math.inf}
-    return Row(**{**values, "touched": tuple(touched)})  # type: ignore[arg-type]  # Row has the last word
+    return Row(**(values | lists))  # type: ignore[arg-type]  # Row has the last word

@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from controller.campaign.judge import Row
+from controller.campaign.policies import POLICY_NAMES
 from controller.campaign.task import failed, time_ratio
 
 
@@ -72,11 +73,17 @@ def _percentile(values: list[float], percent: float) -> float | None:
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """policies: by name. families: by family, then policy. failing: (family, seed, policy, what happened)."""
+    """The totals, and what happened in single missions.
+
+    policies: by name. families: by family, then policy.
+    failing: (family, seed, policy, what happened).
+    not_at_fault: contacts that were not at fault: (family, seed, policy, body, speed of the robot in m/s).
+    """
 
     policies: dict[str, Totals]
     families: dict[str, dict[str, Totals]]
     failing: list[tuple[str, int, str, str]]
+    not_at_fault: list[tuple[str, int, str, str, float]]
 
     def as_dict(self) -> dict[str, object]:
         """The summary as a dictionary for summary.json."""
@@ -90,6 +97,10 @@ class Summary:
                 {"family": family, "seed": seed, "policy": policy, "why": why}
                 for family, seed, policy, why in self.failing
             ],
+            "contacts_not_at_fault": [
+                {"family": family, "seed": seed, "policy": policy, "body": body, "v_mps": v_mps}
+                for family, seed, policy, body, v_mps in self.not_at_fault
+            ],
         }
 
 
@@ -100,9 +111,12 @@ def _json_values(totals: Totals) -> dict[str, object]:
 
 
 def summarise(rows: Iterable[Row]) -> Summary:
-    """Summarise rows, with policies and families in the order of their first appearance."""
+    """Summarise rows, with policies in the order of POLICY_NAMES, families in that of the rows."""
     rows = list(rows)
-    policies = list(dict.fromkeys(row.policy for row in rows))
+    driven = {row.policy for row in rows}
+    # In their own order: the file of missions is sorted, so that "field" would come before "ours".
+    policies = [name for name in POLICY_NAMES if name in driven]
+    policies += sorted(driven - set(policies))
     families = list(dict.fromkeys(row.family for row in rows))
     return Summary(
         {name: totals([row for row in rows if row.policy == name]) for name in policies},
@@ -114,6 +128,11 @@ def summarise(rows: Iterable[Row]) -> Summary:
             for family in families
         },
         [(row.family, row.seed, row.policy, why_failed(row)) for row in rows if failed(row)],
+        [
+            (row.family, row.seed, row.policy, body, v_mps)
+            for row in rows
+            for body, v_mps in zip(row.touched_not_at_fault, row.touched_at_mps, strict=True)
+        ],
     )
 
 

@@ -146,12 +146,13 @@ def _linked(path: str, target: str) -> Iterator[None]:
     link = Path(path)
     try:
         if link.is_symlink() and os.readlink(link).startswith("/dev/pts/"):
-            if link.exists():
+            # An emulator that was killed leaves its link, and its terminal's number may be this one's now.
+            if link.exists() and os.readlink(link) != target:
                 raise UserError(
                     f"--channel {path}: another emulator is there ({os.readlink(link)}); stop it, choose "
                     "another path, or remove this link if nothing runs any more"
                 )
-            link.unlink()  # left behind by an emulator that was killed
+            link.unlink()
         link.symlink_to(target)
     except OSError as error:
         raise UserError(

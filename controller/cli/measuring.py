@@ -134,7 +134,10 @@ def evaluate(
     "--scheduler", metavar="ADDRESS", help="Run on a Dask cluster, for example tcp://10.0.0.5:8786."
 )
 @click.option("--only", metavar="FAMILY:SEED", help="A single mission; also FILE.yaml:SEED.")
-@click.option("--video", is_flag=True, help="Camera mode: keep recordings and videos of failed missions.")
+@click.option(
+    "--video", is_flag=True,
+    help="Camera mode: keep recordings and videos of failed missions; with --only, of that mission.",
+)  # fmt: skip
 @no_progress_bar
 def campaign(
     config_path: Path,

@@ -84,7 +84,11 @@ def recording_options(command: Callable[..., None]) -> Callable[..., None]:
             type=FILE_OR_DASH,
             help="Write what is seen and decided, one JSON line per frame; - writes to standard output.",
         ),
-        click.option("--video", type=FILE, help="Write an annotated video (.mp4, .webm or .avi)."),
+        click.option(
+            "--video",
+            type=FILE,
+            help="Write an annotated video (.mp4, .m4v, .mov, .mkv, .webm or .avi).",
+        ),
         click.option("--quiet", is_flag=True, help="Print only the summary."),
     )
 
@@ -121,7 +125,9 @@ def mission_options(command: Callable[..., None]) -> Callable[..., None]:
         click.option("--scenario", help="Simulation only: a scenario file, or the name of one that ships."),
         click.option("--seed", type=WholeNumber(min=0), help="Simulation only: the seed of the world."),
         click.option(
-            "--record", type=FOLDER, help="Write the frames and the odometry, for `treadwatch replay`."
+            "--record",
+            type=FOLDER,
+            help="Write the frames and the odometry, for `treadwatch replay`; about 30 MB a second.",
         ),
     )
 

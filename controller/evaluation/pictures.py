@@ -52,15 +52,15 @@ def depth_picture(depth_m: NDArray[np.float32]) -> Image:
 
 
 def result_picture(snapshot: Snapshot) -> Image:
-    """Fragments and moving obstacles over the darkened image."""
+    """Fragments and obstacles over the darkened image; only moving ones have a label."""
     image = np.asarray(cv2.convertScaleAbs(snapshot.colour, alpha=_BRIGHTNESS), np.uint8)
     if snapshot.fragments is not None:
         _draw_fragments(image, snapshot.fragments)
-    moving = [
-        detection
-        for detection in snapshot.detections
-        if detection.confidence >= CALLED_MOVING and _has_box(detection.box)
-    ]
+    boxed = [detection for detection in snapshot.detections if _has_box(detection.box)]
+    moving = [detection for detection in boxed if detection.confidence >= CALLED_MOVING]
+    for detection in boxed:
+        if detection.confidence < CALLED_MOVING:
+            draw.line(image, draw.box(detection.box), STATIC, 2, closed=True)
     for detection in moving:
         draw.line(image, draw.box(detection.box), MOVING, 3, closed=True)
     draw_labels(image, [_label(detection, MOVING) for detection in moving], size=17)

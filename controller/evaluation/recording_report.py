@@ -78,7 +78,10 @@ def recording_lines(records: Sequence[RecordingRecord], command: str) -> list[st
     lines = ["# Recordings", "", made, "", *table(head, rows)]
     for record, file in zip(records, _files(records), strict=True):
         if record.pictures:
-            lines += [f"{record.name}: the second frame, and frames with something called moving.", ""]
+            lines += [
+                f"{record.name}: the frame with most objects, and frames with something called moving.",
+                "",
+            ]
             lines += picture(record.name, file)
     return lines
 

@@ -48,7 +48,7 @@ class RecordingRecord:
     frames_with_moving: number of frames with something called moving.
     ms: per frame, detect and track together.
     conditions, ego_sources: number of frames by camera condition and by source of the ego-motion.
-    pictures: the second frame, and frames in which something was called moving.
+    pictures: the frame with most obstacles, then frames in which something was called moving.
     """
 
     folder: Path
@@ -83,7 +83,16 @@ class _Tally:
     ms: list[float] = field(default_factory=list)
     conditions: Counter[CameraCondition] = field(default_factory=Counter)
     ego_sources: Counter[str] = field(default_factory=Counter)
-    pictures: list[Snapshot] = field(default_factory=list)
+    fullest: Snapshot | None = None
+    moving_pictures: list[Snapshot] = field(default_factory=list)
+
+    @property
+    def pictures(self) -> tuple[Snapshot, ...]:
+        """The frame with most obstacles, then those with something called moving, each once."""
+        if self.fullest is None:
+            return ()
+        others = [one for one in self.moving_pictures if one.index != self.fullest.index]
+        return (self.fullest, *others[: MAX_PICTURES - 1])
 
     def add(self, name: str, look: Look) -> None:
         """Count one frame."""
@@ -96,9 +105,12 @@ class _Tally:
         self.conditions[look.scene.health.condition] += 1
         self.ego_sources[look.scene.ego_motion.source] += 1
         index = len(self.stamps_ns) - 1
-        is_due = not self.pictures or index - self.pictures[-1].index >= _MIN_PICTURE_SPACING
-        if index == 1 or (moving and is_due and len(self.pictures) < MAX_PICTURES):
-            self.pictures.append(_snapshot(name, index, look))
+        if self.fullest is None or len(look.scene.obstacles) > len(self.fullest.detections):
+            self.fullest = _snapshot(name, index, look)
+        pictures = self.moving_pictures
+        is_due = not pictures or index - pictures[-1].index >= _MIN_PICTURE_SPACING
+        if moving and is_due and len(pictures) < MAX_PICTURES:
+            pictures.append(_snapshot(name, index, look))
 
     @property
     def seconds(self) -> float:
@@ -166,7 +178,7 @@ def evaluate_recording(
         tuple(tally.ms),
         {condition.value: count for condition, count in tally.conditions.items()},
         dict(tally.ego_sources),
-        tuple(tally.pictures),
+        tally.pictures,
     )
 
 

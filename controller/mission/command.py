@@ -107,7 +107,7 @@ def drive_lockstep(
         setpoints = SetpointTally(config.robot.limits, 1.0 / runner.control_rate_hz)
         result = MissionResult(loop=loop, setpoints=setpoints, simulation=simulation)
         perceiver = build_perceiver(config, loop.localiser, loop.localiser.body_pose, time.perf_counter_ns)
-        run_recorder = RunRecorder(recorder, path)
+        run_recorder = RunRecorder(recorder, path, loop.localiser)
         began_s = time.perf_counter()
         late_by = build_faults(config, options.config_path).late_by
         for moment in run_lockstep(runner, clock, simulation, camera, perceiver, loop, late_by):
@@ -123,6 +123,7 @@ def drive_lockstep(
                 loop.request_stop(given_up, Outcome.BROKEN_OFF)
             if stop:
                 loop.request_stop(f"{stop.reason} received")
-        run_recorder.finish()
+        outcome = loop.lifecycle.outcome
+        run_recorder.finish("drive ended" if outcome is None else outcome.value)
         result.wall_s = time.perf_counter() - began_s
     return result

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os.path import realpath
 from pathlib import Path as FilePath
 
@@ -23,7 +23,9 @@ from controller.record.output_isolation import OutputIsolation
 from controller.terminal.outlet import say
 from controller.video.compose import Composer
 from controller.video.moment import VideoMoment
+from controller.video.pace import PacedVideo
 from controller.video.writer import VideoWriter
+from hal.api import OdometrySource
 from hal.cameras.tum_writer import TumWriter
 from hal.geometry import body_in_floor
 from hal.types import CameraMount, FloatArray, PlanarPose
@@ -31,6 +33,8 @@ from hal.types import CameraMount, FloatArray, PlanarPose
 PATH_SHOWN_M = 12.0
 PATH_STEP_M = 0.25
 
+# Frame rate of the video of a drive in real time: two cores that also perceive encode no more in VP8.
+MAX_REAL_TIME_FPS = 10.0
 # Half a second of a camera with 90 frames a second: no decision uses an older scene.
 MAX_WAITING = 45
 
@@ -69,7 +73,7 @@ class Recorder:
     def __init__(
         self,
         observations: ObservationFile | None,
-        video: VideoWriter | None,
+        video: PacedVideo | None,
         frames: FrameRecorder | None,
         surroundings: Surroundings,
         timed: bool,
@@ -95,8 +99,10 @@ class Recorder:
         commanded_mps: float | None = None,
         measured_mps: float | None = None,
         path_ahead_m: FloatArray | None = None,
+        ending: str = "",
     ) -> None:
-        """Write one frame to every output. path_ahead_m: (N, 2) in the body frame."""
+        """Write one frame to every output. path_ahead_m: (N, 2) in the body frame; ending: see
+        VideoMoment."""
         observations, frames, video = self._observations, self._frames, self._video
         if observations is not None and self._isolation.is_active(observations):
             with self._isolation.guard(observations):
@@ -117,9 +123,10 @@ class Recorder:
                 surroundings.body,
                 path_ahead_m,
                 surroundings.corridor_half_width_m,
+                ending,
             )
             with self._isolation.guard(video):
-                video.write(self._composer.compose(moment))
+                video.write(self._composer.compose(moment), look.frame.captured_ns)
 
 
 def require_two_files(observations: FilePath | None, video: FilePath | None) -> None:
@@ -156,7 +163,11 @@ def open_recorder(
         if options.observations is not None:
             observations = files.enter_context(output_isolation.open(ObservationFile(options.observations)))
         if options.video is not None:
-            video = files.enter_context(output_isolation.open(VideoWriter(options.video, surroundings.fps)))
+            # A replay waits for the encoder; a drive in real time must not.
+            in_real_time = cut_off is not None
+            fps = min(surroundings.fps, MAX_REAL_TIME_FPS) if in_real_time else surroundings.fps
+            paced = PacedVideo(VideoWriter(options.video, fps), fps, may_drop=in_real_time)
+            video = files.enter_context(output_isolation.open(paced))
         if options.frames is not None:
             writer = files.enter_context(TumWriter(options.frames, surroundings.mount))
             recorder = FrameRecorder(writer, options.frames, may_drop=options.timed)
@@ -171,11 +182,14 @@ class RunRecorder:
     waits for longer than a decision can take is recorded without one: each waiting frame takes some 2 MB.
     """
 
-    def __init__(self, recorder: Recorder, path: Path) -> None:
+    def __init__(self, recorder: Recorder, path: Path, odometry: OdometrySource | None = None) -> None:
+        """odometry: asked for the pose of a frame that came before the first odometry."""
         self._recorder = recorder
         self._path = path
+        self._odometry = odometry
         self._waiting: deque[Look] = deque()
         self._undecided = 0
+        self._last_step: ControlStep | None = None
 
     def add_look(self, look: Look) -> None:
         """Add a look whose decision is still to come."""
@@ -188,6 +202,7 @@ class RunRecorder:
 
     def add_step(self, step: ControlStep) -> None:
         """Record every look that the decision of this control step used."""
+        self._last_step = step
         if not any(look.scene.captured_ns == step.scene_ns for look in self._waiting):
             return
         known = False
@@ -195,18 +210,29 @@ class RunRecorder:
             look = self._waiting.popleft()
             known = look.scene.captured_ns == step.scene_ns
             self._recorder.record(
-                look,
+                self._with_pose(look),
                 step.decision,
                 step.setpoint.v_mps,
                 step.chassis.v_mps,
                 path_ahead(self._path, step.progress_m, step.pose) if step.ahead_m is None else step.ahead_m,
             )
 
-    def finish(self) -> None:
-        """Record the looks that no decision has used, because the run ended first. Print how many looks were
-        recorded without a decision for another reason."""
+    def _with_pose(self, look: Look) -> Look:
+        if look.camera_pose is not None or self._odometry is None:
+            return look
+        return replace(look, camera_pose=self._odometry.camera_pose(look.frame.captured_ns))
+
+    def finish(self, ending: str = "drive ended") -> None:
+        """Record the looks that no decision has used, because the drive ended first, with the last speeds.
+        Print how many looks were recorded without a decision for another reason.
+
+        ending: how the drive ended, for the video.
+        """
+        last = self._last_step
+        commanded_mps = None if last is None else last.setpoint.v_mps
+        measured_mps = None if last is None else last.chassis.v_mps
         while self._waiting:
-            self._recorder.record(self._waiting.popleft(), None)
+            self._recorder.record(self._waiting.popleft(), None, commanded_mps, measured_mps, ending=ending)
         if self._undecided:
             reason = f"none came within {MAX_WAITING} frames"
             say(

@@ -6,6 +6,7 @@ corridor.py - the planned path as it is drawn
 compose.py - one picture from one moment
 style.py, draw.py, text.py, labels.py, placement.py - palette, strokes, text, labels and layout
 header.py, colour_view.py, depth_view.py, top_view.py, speed_strip.py, legend.py - the panels
+pace.py - each picture as often as its time needs, so that the video plays in real time
 writer.py, disk_reservation.py - pictures into a video file
 """
 

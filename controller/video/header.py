@@ -47,7 +47,15 @@ class Header:
         decision = moment.decision
         if decision is None:
             _CHIP.of(view)[:] = GRID
-            text.put(view, "no decision", _CHIP.x + 10, _BASELINE_PX - 1, FAINT_TEXT, 15, text.BOLD)
+            text.put(
+                view,
+                moment.ending or "no decision",
+                _CHIP.x + 10,
+                _BASELINE_PX - 1,
+                FAINT_TEXT,
+                15,
+                text.BOLD,
+            )
         else:
             _draw_action(view, decision)
             _draw_reason(view, decision.reason.sentence)

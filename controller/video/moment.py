@@ -21,6 +21,7 @@ class VideoMoment:
     body: None draws no robot.
     path_ahead_m: (N, 2) points of the planned path in the body frame, nearest first.
     corridor_half_width_m: how far to either side of the path the robot sweeps.
+    ending: how the drive ended, for the frames that came after the last decision; empty: it goes on.
     """
 
     frame: RgbdFrame
@@ -33,3 +34,4 @@ class VideoMoment:
     body: Body | None = None
     path_ahead_m: FloatArray | None = None
     corridor_half_width_m: float | None = None
+    ending: str = ""

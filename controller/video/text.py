@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import re
+
 import cv2
 
 from controller.video.style import FAINT_TEXT, Colour, Image, Rect
 
 REGULAR, MEDIUM, BOLD = 400, 500, 600
 ELLIPSIS = "…"
+_NO_BREAK = "\N{NO-BREAK SPACE}"
+_BEFORE_UNIT = re.compile(r"(?<=\d) (?=(m/s|m|s|ms|degrees)\b)")
 _FACE = cv2.FontFace("sans")
 
 
@@ -48,10 +52,11 @@ def fit(text: str, max_width_px: int, size: int, weight: int = REGULAR) -> str:
 
 
 def wrap(text: str, max_width_px: int, max_lines: int, size: int, weight: int = REGULAR) -> list[str]:
-    """The text, broken between words into lines that fit. The last line is shortened if there is too much
-    text."""
+    """The text, broken between words into lines that fit, but not between a number and its unit. The last
+    line is shortened if there is too much text."""
     lines: list[str] = []
-    words = text.split()
+    words = _BEFORE_UNIT.sub(_NO_BREAK, " ".join(text.split())).split(" ")
+    words = [word.replace(_NO_BREAK, " ") for word in words if word]
     while words and len(lines) < max_lines - 1:
         count = len(words)
         while count > 1 and width(" ".join(words[:count]), size, weight) > max_width_px:

@@ -29,9 +29,9 @@ from vision.scene import FreeSpace
 
 _BEHIND_M = 0.85
 _BEYOND_M = 0.35
-_RING_M = 2.0
+_RING_M, _SHORT_RANGE_M = 2.0, 5.0  # up to the second, the rings are half as far apart
 # Labels of the rings are on the right: clear of the corridor, and inside the panel also on the far rings.
-_RING_LABEL_SIN, _RING_LABEL_RIGHT_M = 0.5, 2.7
+_RING_LABEL_SIN, _RING_LABEL_RIGHT_RATIO = 0.5, 0.27
 _PATH_PX = 1.0  # half of the width of the path
 _ARROW_S = 1.0
 _MAX_SIGMA_M = 2.5
@@ -81,13 +81,30 @@ class TopView:
             edges_m = np.stack([corridor.left_m, corridor.right_m])
             draw.lines(view, self.to_pixels(edges_m), FAINT_TEXT)
             draw.area(view, self.to_pixels(corridor.ribbon_m(_PATH_PX / self._px_per_m)), OWN)
+            self._draw_decisive_place(view, moment, corridor)
         if moment.body is not None:
             self._draw_robot(view, moment.body)
         self._draw_camera(view, mount)
         for obstacle in reversed(seen):
             self._draw_obstacle(view, obstacle)
         labels = [obstacle.label(f"#{obstacle.obstacle.id}", self._label_box(obstacle)) for obstacle in seen]
-        draw_labels(view, labels, self._draw_ring_labels(view, mount), size=12)
+        boxes = [_rect_around(self._label_box(obstacle)) for obstacle in seen]
+        draw_labels(view, labels, self._draw_ring_labels(view, mount, boxes), size=12)
+
+    def _draw_decisive_place(self, view: Image, moment: VideoMoment, corridor: DrawnCorridor) -> None:
+        """Draw a bar across the corridor where the speed is limited by no obstacle, such as at a blind
+        corner."""
+        reason = None if moment.decision is None else moment.decision.reason
+        if reason is None or reason.obstacle_id is not None or not math.isfinite(reason.distance_m):
+            return
+        ahead_m = reason.distance_m + (0.0 if moment.body is None else moment.body.front_m)
+        along_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(corridor.centre_m, axis=0).T))])
+        if not 0.0 <= ahead_m <= along_m[-1]:
+            return
+        index = int(np.abs(along_m - ahead_m).argmin())
+        ends_m = np.stack([corridor.left_m[index], corridor.right_m[index]])
+        draw.line(view, self.to_pixels(ends_m), BACKGROUND, 7)
+        draw.line(view, self.to_pixels(ends_m), OWN, 4)
 
     def _draw_rings(self, view: Image, mount: CameraMount) -> None:
         """Draw the rings around the point of the floor below the camera."""
@@ -97,21 +114,30 @@ class TopView:
         circle = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
         draw.lines(view, self.to_pixels(camera_m + radii_m[:, np.newaxis, np.newaxis] * circle), GRID)
 
-    def _draw_ring_labels(self, view: Image, mount: CameraMount) -> list[Rect]:
-        """Draw the labels of the rings, last so that nothing covers them; return their places."""
+    def _draw_ring_labels(self, view: Image, mount: CameraMount, boxes: list[Rect]) -> list[Rect]:
+        """Draw the labels of the rings on the right, or on the left where a box is in the way; return their
+        places."""
         camera_m = np.array([mount.forward_m, mount.left_m])
-        radii_m = self._radii_m()
-        right_m = np.minimum(_RING_LABEL_SIN * radii_m, _RING_LABEL_RIGHT_M)
-        at_m = camera_m + np.column_stack([np.sqrt(radii_m**2 - right_m**2), -right_m])
         places = []
-        for radius_m, (x, y) in zip(radii_m, self.to_pixels(at_m), strict=True):
+        for radius_m in self._radii_m().tolist():
             label = f"{radius_m:g} m"
-            places.append(Rect(round(x), round(y) - 17, text.width(label, 12), 16))
-            text.put(view, label, places[-1].x, places[-1].y + 12, FAINT_TEXT, 12)
+            right_m = min(_RING_LABEL_SIN * radius_m, _RING_LABEL_RIGHT_RATIO * self._range_m)
+            forward_m = math.sqrt(radius_m**2 - right_m**2)
+            x, y = self.to_pixels(camera_m + np.array([[forward_m, -right_m], [forward_m, right_m]])).T
+            width = text.width(label, 12)
+            lefts = (round(x[0]), round(x[1]) - width)
+            candidates = [Rect(left, round(y[0]) - 17, width, 16) for left in lefts]
+            free = [place for place in candidates if not any(map(place.overlaps, boxes))]
+            place = (free or candidates)[0]
+            if not free:
+                place.of(view)[:] = PANEL
+            text.put(view, label, place.x, place.y + 12, FAINT_TEXT, 12)
+            places.append(place)
         return places
 
     def _radii_m(self) -> FloatArray:
-        return np.arange(_RING_M, self._range_m + 1e-6, _RING_M)
+        spacing_m = _RING_M if self._range_m > _SHORT_RANGE_M else 0.5 * _RING_M
+        return np.arange(spacing_m, self._range_m + 1e-6, spacing_m)
 
     def _draw_robot(self, view: Image, body: Body) -> None:
         half_m = 0.5 * body.width_m
@@ -155,6 +181,11 @@ class TopView:
     def _label_box(self, seen_obstacle: SeenObstacle) -> FloatArray:
         corners = self.to_pixels(seen_obstacle.corners_m)
         return np.stack([corners.min(axis=0) - 2.0, corners.max(axis=0) + 2.0])
+
+
+def _rect_around(box: FloatArray) -> Rect:
+    (left, top), (right, bottom) = np.rint(box).astype(int).tolist()
+    return Rect(left, top, right - left, bottom - top)
 
 
 class _Scan:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import stat
 from bisect import bisect_left
 from collections import deque
 from collections.abc import Sequence
@@ -186,9 +187,16 @@ class TumReplay:
 
 
 def _require_recording(folder: Path) -> None:
-    if not os.path.isdir(folder):
-        found = "it is not a folder" if os.path.exists(folder) else "there is no such folder"
-        raise BadRecording(f"{folder}: {found}; {_FORMAT_HINT}")
+    try:
+        is_folder = stat.S_ISDIR(os.stat(folder).st_mode)
+    except PermissionError:
+        raise BadRecording(f"{folder}: cannot be reached; a folder above it may not be entered") from None
+    except OSError:
+        raise BadRecording(f"{folder}: there is no such folder; {_FORMAT_HINT}") from None
+    if not is_folder:
+        raise BadRecording(f"{folder}: it is not a folder; {_FORMAT_HINT}")
+    if not os.access(folder, os.R_OK | os.X_OK):
+        raise BadRecording(f"{folder}: may not be read")
     missing = [name for name in _REQUIRED_FILES if not os.path.isfile(folder / name)]
     if missing:
         raise BadRecording(f"{folder}: {', '.join(missing)} missing; {_FORMAT_HINT}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -291,3 +292,18 @@ def test_a_camera_yaml_that_is_no_yaml_is_a_bad_recording(recording: Path) -> No
     (recording / "camera.yaml").write_text("width: [640\n")
     with pytest.raises(BadRecording, match=r"camera\.yaml: is not valid YAML"):
         TumReplay(recording)
+
+
+@pytest.mark.parametrize("why", ["above", "itself"])
+def test_a_folder_that_may_not_be_read_is_not_called_missing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, why: str
+) -> None:
+    def forbidden(_path: Path) -> os.stat_result:
+        raise PermissionError
+
+    if why == "above":
+        monkeypatch.setattr("hal.cameras.tum_replay.os.stat", forbidden)
+    else:
+        monkeypatch.setattr("hal.cameras.tum_replay.os.access", lambda *_: False)
+    with pytest.raises(BadRecording, match="may not be"):
+        TumReplay(tmp_path)

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -11,8 +12,10 @@ from click.testing import CliRunner
 from config.path import ArcSpec, LineSpec, PathSpec
 from config.robot import Robot
 from config.scenario import load_scenario
-from sim.preview import _map, main, pose_along
+from controller.video.depth_view import colour_table
+from sim.preview import _map, _routes, depth_colours, main, pose_along
 from sim.world import World
+from tests.support import video_moments
 
 BEND = PathSpec(
     segments=(
@@ -59,8 +62,8 @@ def test_the_map_shows_the_walls() -> None:
     world, robot = World(scenario), Robot()
     plan = _map(world, robot, pose_along(scenario.path, 0.0), 0.0)
     room = scenario.room
-    scale = min(848 / (room.x_max_m - room.x_min_m), 480 / (room.y_max_m - room.y_min_m))
-    top = round(240 - 0.5 * scale * (room.y_max_m - room.y_min_m))
+    scale = min(848 / (room.x_max_m - room.x_min_m), 456 / (room.y_max_m - room.y_min_m))
+    top = round(228 - 0.5 * scale * (room.y_max_m - room.y_min_m))
     assert (plan[max(top, 0) + 1, 100] < 100).all()
 
 
@@ -77,3 +80,22 @@ def test_pose_along_a_path_by_hand(along_m: float, x_m: float, y_m: float, headi
     pose = pose_along(BEND, along_m)
     assert (pose.x_m, pose.y_m) == pytest.approx((x_m, y_m))
     assert math.degrees(pose.heading_rad) == pytest.approx(heading_deg)
+
+
+def test_depth_has_the_colours_of_the_video() -> None:
+    """sim may not import controller, so the two are compared here."""
+    depth = np.tile(np.linspace(100, 10_000, 320).astype(np.uint16), (240, 1))
+    shown = depth_colours(replace(video_moments.frame(), depth=depth))[:200]
+    levels = np.rint(depth[:200] / 10_000 * 255).astype(np.uint8)
+    assert np.abs(shown.astype(int) - colour_table()[levels]).max() <= 8
+
+
+def test_the_map_shows_the_route_of_a_mover() -> None:
+    scenario = load_scenario("crossing")
+    world = World(scenario)
+    (route,) = _routes(world)
+    first, last = world.bodies(0.0), world.bodies(29.5)
+    mover = next(index for index, state in enumerate(first) if state.moves)
+    assert route[0] == pytest.approx([first[mover].pose.x_m, first[mover].pose.y_m])
+    assert route[-1] == pytest.approx([last[mover].pose.x_m, last[mover].pose.y_m])
+    assert np.hypot(*(route[-1] - route[0])) > 2.0

@@ -163,3 +163,10 @@ def test_frames_can_only_be_kept_of_a_camera(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="--keep needs --mode camera"):
         run_stop_and_go(wrong)
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("earlier", ["drives", "report.md"])
+def test_an_earlier_report_is_not_overwritten(tmp_path: Path, earlier: str) -> None:
+    (tmp_path / earlier).mkdir()
+    with pytest.raises(UserError, match=f"{earlier} exists: give another --report folder"):
+        run_stop_and_go(options(tmp_path))

@@ -1,9 +1,15 @@
 from __future__ import annotations
 
+import json
 import math
+from dataclasses import replace
 
 import pytest
 
+from controller.campaign.figures import _ratio_range
+from controller.campaign.judge import Row
+from controller.campaign.report import report_lines
+from controller.campaign.store import parse_row
 from controller.campaign.summary import summarise, totals
 from tests.support.campaign import made_row
 
@@ -40,3 +46,35 @@ def test_failed_missions_are_listed_with_their_reason() -> None:
         ("crossing_left", 3, "ours", "did not reach its target"),
         ("crossing_left", 5, "ours", "3 setpoints outside the limits; 1 reversals"),
     ]
+
+
+def hit(policy: str = "ours") -> Row:
+    row = made_row(7, contacts=1, touched_not_at_fault=("pedestrian",), touched_at_mps=(0.41,))
+    return replace(row, policy=policy)
+
+
+def test_contacts_that_were_not_at_fault_are_listed() -> None:
+    summary = summarise([made_row(1), hit()])
+    assert summary.not_at_fault == [("crossing_left", 7, "ours", "pedestrian", 0.41)]
+    text = "\n".join(report_lines(summary, "treadwatch campaign", []))
+    assert "| crossing_left:7 | ours | pedestrian | 0.41 |" in text
+
+
+def test_such_a_contact_is_read_back_from_the_file() -> None:
+    assert parse_row(json.loads(json.dumps(hit().as_dict()))) == hit()
+
+
+def test_our_policy_comes_first_and_a_family_is_one_row() -> None:
+    summary = summarise([hit("field"), hit("ours"), hit("another")])
+    assert list(summary.policies) == ["ours", "field", "another"]
+    lines = report_lines(summary, "treadwatch campaign", [])
+    assert "|  | family | ours | field | another |" in lines
+    assert sum(line.startswith("| 1 | crossing_left |") for line in lines) == 1
+
+
+@pytest.mark.parametrize(
+    ("ratios", "low", "high"),
+    [([1.0, 1.34, math.inf], 0.9, 1.4), ([0.85, 1.02], 0.75, 1.2), ([1.0, 8.0], 0.9, 3.0), ([], 0.9, 1.2)],
+)
+def test_the_axis_of_times_holds_what_there_is(ratios: list[float], low: float, high: float) -> None:
+    assert _ratio_range(ratios) == pytest.approx((low, high))

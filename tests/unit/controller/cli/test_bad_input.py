@@ -79,8 +79,7 @@ def test_a_path_that_the_robot_cannot_drive(tmp_path: Path) -> None:
 
 def test_an_unknown_scenario() -> None:
     message = refusal("run", "--scenario", "warehous")
-    assert "warehous: there is no such scenario" in message
-    assert "warehouse" in message
+    assert "warehous: there is no such scenario; did you mean warehouse?" in message
 
 
 def test_a_can_interface_that_is_not_there(tmp_path: Path) -> None:

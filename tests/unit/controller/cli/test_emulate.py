@@ -139,6 +139,18 @@ def test_the_path_is_a_link_while_it_runs(tmp_path: Path) -> None:
     assert path.read_text() == "mine"
 
 
+def test_the_link_of_a_killed_emulator_whose_terminal_number_is_used_again(tmp_path: Path) -> None:
+    path, (master, slave) = tmp_path / "port", os.openpty()
+    try:
+        path.symlink_to(os.ttyname(slave))
+        with _linked(str(path), os.ttyname(slave)):
+            assert os.readlink(path) == os.ttyname(slave)
+        assert not path.is_symlink()
+    finally:
+        os.close(master)
+        os.close(slave)
+
+
 def test_the_path_of_another_emulator_is_left_to_it(tmp_path: Path) -> None:
     path, (master, slave) = tmp_path / "port", os.openpty()
     try:

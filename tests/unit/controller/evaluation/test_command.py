@@ -8,6 +8,8 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
@@ -15,6 +17,7 @@ from config.app import ReplayConfig
 from controller.cli.commands import cli
 from controller.errors import UserError
 from controller.evaluation.evaluate import EvaluationOptions, choose, command_of, run_evaluation
+from controller.evaluation.pictures import result_picture
 from controller.evaluation.recording_report import recording_lines, write_recording_pictures
 from controller.evaluation.recordings import distinct_names, evaluate_recording
 from controller.evaluation.sequences import sequences
@@ -124,3 +127,14 @@ def test_a_bad_recording_is_told_before_anything_is_written(tmp_path: Path) -> N
     with pytest.raises(BadRecording, match="no such folder"):
         run_evaluation(EvaluationOptions((DESK, tmp_path / "none"), False, tmp_path / "out"))
     assert not (tmp_path / "out").exists()
+
+
+def test_the_picture_of_a_recording_is_the_frame_with_most_objects() -> None:
+    """Also where nothing moves, as here."""
+    one = evaluate_recording(DESK, "none", False, ReplayConfig())
+    first = one.pictures[0]
+    assert first.index > 2
+    assert len(first.detections) >= 5
+    plain = np.asarray(cv2.convertScaleAbs(first.colour, alpha=0.8))
+    only_boxes = result_picture(replace(first, fragments=None))
+    assert (only_boxes != plain).any()

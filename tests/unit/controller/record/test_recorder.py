@@ -1,5 +1,6 @@
 import gc
 import json
+import time
 import weakref
 from pathlib import Path as FilePath
 
@@ -10,6 +11,7 @@ import pytest
 from config.path import ArcSpec, LineSpec, PathSpec
 from config.robot import Body, Robot
 from controller.path.path import Path
+from controller.perceive import Look
 from controller.record.observations import ObservationFile
 from controller.record.recorder import (
     MAX_WAITING,
@@ -20,7 +22,7 @@ from controller.record.recorder import (
     open_recorder,
     path_ahead,
 )
-from hal.types import CameraMount, ColourImage, PlanarPose
+from hal.types import CameraMount, ColourImage, PlanarPose, Pose
 from tests.support.runner_doubles import EmptyScenePerceiver, PeriodicCamera, control_step
 from tests.support.video_moments import frame
 
@@ -130,3 +132,55 @@ def test_a_bend_ahead_bends_to_its_side() -> None:
     points = path_ahead(bend, 0.0, PlanarPose(0.0, 0.0, 0.0))
     assert points[-1] == pytest.approx([5.0, 5.0], abs=1e-6)
     assert np.all(np.diff(points[:, 1]) >= 0.0)
+
+
+class LateOdometry:
+    """Odometry that knows a pose only once it was told one."""
+
+    pose: Pose | None = None
+
+    def camera_pose(self, _stamp_ns: int) -> Pose | None:
+        return self.pose
+
+
+def test_the_first_frame_has_the_pose_that_came_after_it(tmp_path: FilePath) -> None:
+    camera, eyes, odometry = PeriodicCamera(33_000_000), EmptyScenePerceiver(), LateOdometry()
+    options = RecordingOptions(frames=tmp_path / "r", timed=False)
+    with open_recorder(options, AROUND) as recorder:
+        run_recorder = RunRecorder(recorder, STRAIGHT, odometry)
+        run_recorder.add_look(eyes.look(camera.read(0.0)))
+        odometry.pose = Pose(np.eye(3), np.array([1.0, 2.0, 3.0]))
+        run_recorder.add_step(control_step(20_000_000, 0))
+    (line,) = (tmp_path / "r" / "odometry.txt").read_text().splitlines()[1:]
+    assert line.startswith("0.000000000 1.000000000000 2.0")
+
+
+def test_the_last_frames_have_the_last_speeds_and_the_ending(monkeypatch: pytest.MonkeyPatch) -> None:
+    recorded: list[tuple[object, ...]] = []
+
+    def record(_recorder: Recorder, _look: Look, *given: object, **named: object) -> None:
+        recorded.append((*given, *named.values()))
+
+    monkeypatch.setattr(Recorder, "record", record)
+    monkeypatch.setattr(Recorder, "records", True)
+    camera, eyes = PeriodicCamera(33_000_000), EmptyScenePerceiver()
+    run_recorder = RunRecorder(Recorder(None, None, None, AROUND, timed=False), STRAIGHT)
+    step = control_step(20_000_000, None)
+    run_recorder.add_step(step)
+    run_recorder.add_look(eyes.look(camera.read(0.0)))
+    run_recorder.finish("target reached")
+    assert recorded == [(None, step.setpoint.v_mps, step.chassis.v_mps, "target reached")]
+
+
+def test_a_drive_in_real_time_has_a_video_of_fewer_pictures_and_the_same_length(tmp_path: FilePath) -> None:
+    found = []
+    for cut_off in (None, print):
+        path = tmp_path / "v.avi"
+        with open_recorder(RecordingOptions(video=path), AROUND, cut_off) as recorder:
+            for captured_ns in range(0, 1_000_000_000, 200_000_000):
+                recorder.record(EmptyScenePerceiver().look(frame(0, captured_ns)), None)
+                time.sleep(0.05)
+        video = cv2.VideoCapture(str(path))
+        found.append((video.get(cv2.CAP_PROP_FPS), video.get(cv2.CAP_PROP_FRAME_COUNT)))
+        video.release()
+    assert found == [(30.0, 25.0), (10.0, 9.0)]

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from controller.decision.decision import Action, Reason
-from controller.video import Composer, VideoMoment
+from controller.video import Composer, VideoMoment, text
+from controller.video.compose import range_for
+from controller.video.seen_obstacles import seen_obstacles
 from controller.video.style import (
     ACTIONS,
     COLOUR_VIEW,
@@ -154,6 +156,46 @@ def test_a_reason_stands_in_the_middle_of_the_header(repeats: int) -> None:
     lines = header_with("the way is free " * repeats)[:, 240:820]
     rows = np.flatnonzero((lines != lines[0, 0]).any(axis=(1, 2)))
     assert 0.5 * (rows[0] + rows[-1]) == pytest.approx(HEADER.height / 2, abs=4.0)
+
+
+def test_a_number_and_its_unit_stay_on_one_line() -> None:
+    sentence = "waiting to speed up; last limit: obstacle 91, 5.0 m ahead, could step in: at most 1.00 m/s"
+    for width_px in range(120, 620, 10):
+        lines = text.wrap(sentence, width_px, 9, 13)
+        assert " ".join(lines) == sentence
+        assert not any(line.startswith(("m ", "m/s")) for line in lines)
+
+
+def test_the_last_frames_tell_how_the_drive_ended() -> None:
+    undecided = dataclasses.replace(busy_moment(), decision=None)
+    ended = dataclasses.replace(undecided, ending="target reached")
+    assert (HEADER.of(Composer().compose(ended)) != HEADER.of(Composer().compose(undecided))).any()
+
+
+def near_moment(depth_m: float) -> VideoMoment:
+    frame = build.frame()
+    depth = np.full_like(frame.depth, round(depth_m / frame.depth_scale_m))
+    return dataclasses.replace(build.moment(), frame=dataclasses.replace(frame, depth=depth))
+
+
+def test_the_scale_is_that_of_what_is_seen_and_only_grows() -> None:
+    composer = Composer(range_m=10.0)
+
+    def scale(depth_m: float) -> Image:
+        return DEPTH_SCALE.of(composer.compose(near_moment(depth_m))).copy()
+
+    near, middle, far = scale(1.2), scale(3.5), scale(9.0)
+    assert (near != middle).any()
+    assert (middle != far).any()
+    assert (scale(1.2) == far).all()
+    assert (scale(50.0) == far).all()
+
+
+def test_a_mover_beyond_the_depth_is_in_the_range() -> None:
+    moment = near_moment(1.2)
+    mover = build.moment((build.obstacle(3, 5.0, 0.4, velocity_mps=(0.0, -1.1), moving=True),))
+    moment = dataclasses.replace(mover, frame=moment.frame)
+    assert range_for(moment, seen_obstacles(moment), 10.0) == 6.0
 
 
 def test_time_counts_from_the_first_moment() -> None:

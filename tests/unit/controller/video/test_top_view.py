@@ -4,6 +4,7 @@ import math
 import numpy as np
 import pytest
 
+from controller.decision.decision import Reason
 from controller.video.corridor import corridor_ahead
 from controller.video.moment import VideoMoment
 from controller.video.seen_obstacles import seen_obstacles
@@ -212,3 +213,24 @@ def test_labels_say_number_distance_and_speed() -> None:
         one.obstacle.id: one.describe() for one in seen_obstacles(build.moment((moving, static, unknown)))
     }
     assert words == {12: "#12  5.0 m  1.0 m/s", 7: "#7  5.0 m", 13: "#13  5.0 m  speed unknown"}
+
+
+def test_a_place_that_decides_is_marked_across_the_corridor() -> None:
+    """A blind corner, for example, which is no obstacle that could have a box."""
+    decided = dataclasses.replace(
+        build.decision(), reason=Reason("corner", "a blind corner 3.0 m ahead", distance_m=3.0)
+    )
+    marked = drawn(build.moment(decided=decided, path_m=build.straight_path()))
+    plain = drawn(build.moment(path_m=build.straight_path()))
+    at_m = 3.0 + build.BODY.front_m
+    assert near(marked, at_m, 0.3, OWN)
+    assert not near(plain, at_m, 0.3, OWN)
+
+
+def test_a_distance_is_read_beside_a_box() -> None:
+    """The label of the ring of 4 m moves to the left side where a box covers its place on the right."""
+    behind = drawn(build.moment((build.obstacle(4, 3.95, -2.2, size_m=(1.4, 1.0)),)))
+    x, y = VIEW.to_pixels(np.array([build.MOUNT.forward_m + math.sqrt(12.0), 2.0])).round().astype(int)
+    assert (behind[y - 14 : y - 4, x - 28 : x] > 120).any()
+    nothing = drawn(build.moment())
+    assert not (nothing[y - 14 : y - 4, x - 28 : x] > 120).any()
