@@ -22,7 +22,7 @@ from controller.record.recorder import (
     open_recorder,
     path_ahead,
 )
-from hal.types import CameraMount, ColourImage, PlanarPose, Pose
+from hal.types import CameraMount, ColourImage, PlanarPose
 from tests.support.runner_doubles import EmptyScenePerceiver, PeriodicCamera, control_step
 from tests.support.video_moments import frame
 
@@ -132,27 +132,6 @@ def test_a_bend_ahead_bends_to_its_side() -> None:
     points = path_ahead(bend, 0.0, PlanarPose(0.0, 0.0, 0.0))
     assert points[-1] == pytest.approx([5.0, 5.0], abs=1e-6)
     assert np.all(np.diff(points[:, 1]) >= 0.0)
-
-
-class LateOdometry:
-    """Odometry that knows a pose only once it was told one."""
-
-    pose: Pose | None = None
-
-    def camera_pose(self, _stamp_ns: int) -> Pose | None:
-        return self.pose
-
-
-def test_the_first_frame_has_the_pose_that_came_after_it(tmp_path: FilePath) -> None:
-    camera, eyes, odometry = PeriodicCamera(33_000_000), EmptyScenePerceiver(), LateOdometry()
-    options = RecordingOptions(frames=tmp_path / "r", timed=False)
-    with open_recorder(options, AROUND) as recorder:
-        run_recorder = RunRecorder(recorder, STRAIGHT, odometry)
-        run_recorder.add_look(eyes.look(camera.read(0.0)))
-        odometry.pose = Pose(np.eye(3), np.array([1.0, 2.0, 3.0]))
-        run_recorder.add_step(control_step(20_000_000, 0))
-    (line,) = (tmp_path / "r" / "odometry.txt").read_text().splitlines()[1:]
-    assert line.startswith("0.000000000 1.000000000000 2.0")
 
 
 def test_the_last_frames_have_the_last_speeds_and_the_ending(monkeypatch: pytest.MonkeyPatch) -> None:
