@@ -90,7 +90,7 @@ def _drive(
         devices.enter_context(chassis)
         devices.enter_context(camera)
         files = devices.enter_context(open_recorder(options, surroundings(config)))
-        recorder = RunRecorder(files, path, loop.localiser)
+        recorder = RunRecorder(files, path)
         perceiver = build_perceiver(config, loop.localiser, loop.localiser.body_pose, time.perf_counter_ns)
         monitor = _ProgressMonitor(stage, simulation, log)
         for moment in run_lockstep(

@@ -45,7 +45,7 @@ def ratio_figure(rows: list[Row]) -> Image:
 def clearance_figure(rows: list[Row]) -> Image:
     """Cumulative distribution of the smallest clearance, by policy; below 0 is contact."""
     image = blank(_WIDTH, _HEIGHT)
-    least_m = min((row.min_clearance_m for row in rows), default=0.0)
+    least_m = min((row.min_clearance_m for row in rows if math.isfinite(row.min_clearance_m)), default=0.0)
     low_m = min(_MIN_CLEARANCE_M, math.floor(least_m / _CLEARANCE_STEP_M) * _CLEARANCE_STEP_M)
     chart = Chart(
         image,

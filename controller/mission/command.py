@@ -107,7 +107,7 @@ def drive_lockstep(
         setpoints = SetpointTally(config.robot.limits, 1.0 / runner.control_rate_hz)
         result = MissionResult(loop=loop, setpoints=setpoints, simulation=simulation)
         perceiver = build_perceiver(config, loop.localiser, loop.localiser.body_pose, time.perf_counter_ns)
-        run_recorder = RunRecorder(recorder, path, loop.localiser)
+        run_recorder = RunRecorder(recorder, path)
         began_s = time.perf_counter()
         late_by = build_faults(config, options.config_path).late_by
         for moment in run_lockstep(runner, clock, simulation, camera, perceiver, loop, late_by):

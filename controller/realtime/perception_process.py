@@ -155,7 +155,7 @@ def _look_until_the_end(
         open_recorder(recording, surroundings(config), partial(_say_cut_off, channel)) as recorder,
     ):
         perceiver = build_perceiver(config, body, body.body_pose, time.perf_counter_ns)
-        run_recorder = RunRecorder(recorder, path, body)
+        run_recorder = RunRecorder(recorder, path)
         try:
             while True:
                 # Without a frame the newest scene ages and the robot stops; the camera may come back.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from os.path import realpath
 from pathlib import Path as FilePath
 
@@ -25,7 +25,6 @@ from controller.video.compose import Composer
 from controller.video.moment import VideoMoment
 from controller.video.pace import PacedVideo
 from controller.video.writer import VideoWriter
-from hal.api import OdometrySource
 from hal.cameras.tum_writer import TumWriter
 from hal.geometry import body_in_floor
 from hal.types import CameraMount, FloatArray, PlanarPose
@@ -182,11 +181,9 @@ class RunRecorder:
     waits for longer than a decision can take is recorded without one: each waiting frame takes some 2 MB.
     """
 
-    def __init__(self, recorder: Recorder, path: Path, odometry: OdometrySource | None = None) -> None:
-        """odometry: asked for the pose of a frame that came before the first odometry."""
+    def __init__(self, recorder: Recorder, path: Path) -> None:
         self._recorder = recorder
         self._path = path
-        self._odometry = odometry
         self._waiting: deque[Look] = deque()
         self._undecided = 0
         self._last_step: ControlStep | None = None
@@ -210,17 +207,12 @@ class RunRecorder:
             look = self._waiting.popleft()
             known = look.scene.captured_ns == step.scene_ns
             self._recorder.record(
-                self._with_pose(look),
+                look,
                 step.decision,
                 step.setpoint.v_mps,
                 step.chassis.v_mps,
                 path_ahead(self._path, step.progress_m, step.pose) if step.ahead_m is None else step.ahead_m,
             )
-
-    def _with_pose(self, look: Look) -> Look:
-        if look.camera_pose is not None or self._odometry is None:
-            return look
-        return replace(look, camera_pose=self._odometry.camera_pose(look.frame.captured_ns))
 
     def finish(self, ending: str = "drive ended") -> None:
         """Record the looks that no decision has used, because the drive ended first, with the last speeds.

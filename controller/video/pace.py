@@ -55,8 +55,8 @@ class PacedVideo:
     """Encodes pictures in its own thread, each as often as its time needs. OpenCV encodes without the
     interpreter's lock.
 
-    may_drop: if encoding does not keep up, a picture is left out, and the one before it is shown for longer;
-    otherwise write() waits.
+    may_drop: if encoding does not keep up, a picture is left out, and the one before it is shown for longer,
+    up to MAX_STILL_S; otherwise write() waits.
     """
 
     def __init__(self, video: VideoWriter, fps: float, may_drop: bool) -> None:
@@ -64,7 +64,7 @@ class PacedVideo:
         self._waiting: deque[tuple[Future[None], int]] = deque()
         self._thread: ThreadPoolExecutor | None = None
         self._last: Image | None = None
-        self._failed = False
+        self._failed = self._hurries = False
 
     def __enter__(self) -> Self:
         self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="video")
@@ -74,8 +74,12 @@ class PacedVideo:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Encode the pictures that are waiting, and finish the file. Raises VideoError if that fails, unless
-        another error ends the block: that one is more important."""
+        another error ends the block: that one is more important.
+
+        A drive in real time does not wait for repeated pictures then: its last seconds may be shorter.
+        """
         assert self._thread is not None
+        self._hurries = self._may_drop
         self._thread.shutdown(wait=True)
         try:
             with self._video:
@@ -102,7 +106,8 @@ class PacedVideo:
         try:
             if self._last is not None:
                 for _ in range(due - 1):
-                    self._video.write(self._last)
+                    if not self._hurries:
+                        self._video.write(self._last)
             self._video.write(picture)
         except VideoError:
             self._failed = True
