@@ -53,8 +53,8 @@ class StopAndGo:
 
     to_stop_s: from when the free way is no longer than a comfortable stop needs (the last such moment before
         it stands) until it stands.
-    braking_s: reference for to_stop_s: a comfortable stop from that speed, without acceleration before it.
-        A robot that began earlier takes less.
+    braking_s: reference for to_stop_s: a comfortable stop to STOPPED_MPS from the speed and acceleration at
+        that moment. A robot that began earlier takes less.
     hold_share: share of the time for which the stop is held.
     to_resume_s: from when the way is free until 0.10 m/s.
     starting_s: reference for to_resume_s: from rest to 0.10 m/s at the jerk limit. A robot that began before
@@ -132,7 +132,7 @@ def measure(recording: DriveRecording, robot: Robot, decision: DecisionConfig) -
         unknown = math.nan
         false_stops = _standing_share(v[driving:])
         return StopAndGo(unknown, unknown, unknown, unknown, starting_s, unknown, false_stops)
-    braking_s = braking.stop(max(float(v[stop_due]), 0.0), 0.0, comfort).time_s
+    braking_s = _braking_s(times, v, stop_due, comfort)
     clear_step = _first_index(~np.isfinite(free) | (free > needed_m[stop_due] + 1.0), stop_due, min_run=1)
     stopped = _first_index(v <= STOPPED_MPS, stop_due)
     to_stop_s, hold = math.inf, 0.0
@@ -166,6 +166,14 @@ def _stopping_distances_m(
             for speed in v_mps
         ]
     )
+
+
+def _braking_s(times_s: FloatArray, v_mps: FloatArray, step: int, limits: braking.BrakeLimits) -> float:
+    """The time that a stop to STOPPED_MPS takes from the speed and acceleration at this step."""
+    accel_mps2 = float(np.gradient(v_mps, times_s)[step])
+    to_rest_s = braking.stop(max(float(v_mps[step]), 0.0), accel_mps2, limits).time_s
+    # A stop ends with the deceleration fading at the jerk limit: v = j t^2 / 2 before the end.
+    return max(to_rest_s - math.sqrt(2.0 * STOPPED_MPS / limits.jerk_mps3), 0.0)
 
 
 def _stop_due_step(free_m: FloatArray, needed_m: FloatArray, v_mps: FloatArray, driving: int) -> int:

@@ -45,12 +45,23 @@ def measured(recording: DriveRecording) -> StopAndGo:
 def test_the_four_numbers() -> None:
     found = measured(made_up())
     assert found.to_stop_s == pytest.approx(4.0)
-    assert found.braking_s == pytest.approx(braking.stop(1.0, 0.0, braking.comfort(ROBOT.limits)).time_s)
+    # 1 / 0.3 + 0.3 / 0.6 s to rest, of which the last 0.02 m/s take sqrt(2 0.02 / 0.6) s.
+    assert found.braking_s == pytest.approx(3.8333 - 0.2582, abs=1e-4)
     assert found.hold_share == 1.0
     assert found.to_resume_s == pytest.approx(1.0)
     assert found.starting_s == pytest.approx(math.sqrt(2.0 * 0.1 / 0.6))
     assert found.to_decide_s == pytest.approx(1.0)
     assert found.false_stop_share == 0.0
+
+
+def test_an_acceleration_has_to_end_before_the_robot_brakes() -> None:
+    recording = made_up()
+    t, v = recording.times_s, recording.v_mps.copy()
+    v[(t >= 8.0) & (t < 14.0)] += 0.1 * (t[(t >= 8.0) & (t < 14.0)] - 10.0)
+    comfort = braking.comfort(ROBOT.limits)
+    expected_s = braking.stop(1.0, 0.1, comfort).time_s - math.sqrt(2.0 * 0.02 / 0.6)
+    assert measured(replace(recording, v_mps=v)).braking_s == pytest.approx(expected_s)
+    assert expected_s > 3.8333 - 0.2582
 
 
 def test_going_on_too_early_is_no_hold() -> None:
