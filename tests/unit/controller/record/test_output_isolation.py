@@ -105,7 +105,7 @@ def test_unforeseen_error_in_an_output_ends_that_output_only(
     options = RecordingOptions(tmp_path / "o.jsonl", tmp_path / "v.mp4")
     with open_recorder(options, AROUND, told.append) as recorder:
         record(recorder, 3)
-    assert told == ["VideoWriter: ValueError: operands could not be broadcast"]
+    assert told == ["PacedVideo: ValueError: operands could not be broadcast"]
     assert len((tmp_path / "o.jsonl").read_text().splitlines()) == 3
     with pytest.raises(ValueError, match="broadcast"), open_recorder(options, AROUND) as recorder:
         record(recorder, 1)
