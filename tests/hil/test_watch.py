@@ -25,7 +25,9 @@ def summary_of(out: str) -> dict[str, str]:
 def test_the_simulated_warehouse_is_watched_and_nothing_moves(tmp_path: Path) -> None:
     seen, recorded = tmp_path / "seen.jsonl", tmp_path / "frames"
     done = treadwatch("watch", "--for", "3", "--observations", seen, "--record", recorded)
-    assert (done.returncode, done.stderr) == (0, ""), done.stdout + done.stderr
+    assert done.returncode == 0, done.stdout + done.stderr
+    # A slow disk may cost frames of the recording; that is told, and nothing else is.
+    assert all("frames were left out" in line for line in done.stderr.splitlines()), done.stderr
     said = summary_of(done.stdout)
     assert "(watched for 3 s); nothing was commanded" in said["watched"]
     assert said["floor"].startswith("0.60 m below the camera, which looks down by 4.")
