@@ -30,6 +30,7 @@ from vision.bodies.births import MIN_CELLS
 from vision.bodies.cutting import Cut
 from vision.bodies.division import SINGLE_WIDTH_M
 from vision.bodies.ends import near_ends
+from vision.bodies.masks import cells_of
 from vision.bodies.tracks import Tracks
 from vision.depth import connected
 from vision.depth.connected import IntGrid
@@ -77,13 +78,13 @@ def cuts(
     asked = searched | overgrown
     if not asked.any():
         return []
-    search_area = _cells_of(labels, asked)
+    search_area = cells_of(labels, asked)
     moving_cells = changes.arrived & search_area
     moving_cells |= _around_moving_fragments(detection, velocities, suspicious, search_area, config)
     if not moving_cells.any():
         return []
     rests = _static_rests(detection.grid, labels, overgrown, moving_cells, changes.stayed, config.depth_noise)
-    inside = _cells_of(labels, searched) if overgrown.any() else search_area
+    inside = cells_of(labels, searched) if overgrown.any() else search_area
     return rests + _suspects(detection.grid, moving_cells & inside, inside)
 
 
@@ -115,18 +116,6 @@ def _may_hide_mover(
         searched[t] = not mover[t] and (not compact or touched)
         overgrown[t] = tracks.moving[t] and not compact
     return searched, overgrown
-
-
-@compiled("int32[:, ::1], boolean[::1]")
-def _cells_of(labels: IntGrid, chosen: NDArray[np.bool_]) -> BoolGrid:
-    """(h, w) the cells of tracks chosen (T,)."""
-    height, width = labels.shape
-    result = np.zeros((height, width), np.bool_)
-    for i in range(height):
-        for j in range(width):
-            if labels[i, j] > 0:
-                result[i, j] = chosen[labels[i, j] - 1]
-    return result
 
 
 def _static_rests(

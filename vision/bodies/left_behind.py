@@ -22,6 +22,7 @@ from vision.bodies.arrivals import NEIGHBOURHOOD, ViewMemory
 from vision.bodies.births import MIN_CELLS
 from vision.bodies.cutting import Cut
 from vision.bodies.division import SINGLE_WIDTH_M
+from vision.bodies.masks import cells_of
 from vision.bodies.tracks import Tracks
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import BoolGrid, DepthGrid
@@ -60,7 +61,7 @@ def cuts(
     if not asked.any():
         return []
     grid, pose, now_ns = detection.grid, detection.pose, detection.captured_ns
-    on_mover = _on_mover(labels, tracks.moving)
+    on_mover = cells_of(labels, tracks.moving)
     around = mask & cv2.dilate(on_mover.view(np.uint8), NEIGHBOURHOOD).view(np.bool_)
     stayed, stayed_s = memory.stayed(grid, around, pose, now_ns, _LOOK_BACK_S)
     gone = asked & (tracks.speed_mps * stayed_s >= _MIN_DISPLACEMENT_M)
@@ -115,17 +116,6 @@ def _was_there(
         if not stayed[row, column]:
             return True
     return True
-
-
-@compiled("int32[:, ::1], boolean[::1]")
-def _on_mover(labels: IntGrid, moving: NDArray[np.bool_]) -> BoolGrid:
-    """(h, w) cells of the tracks that move (T,)."""
-    height, width = labels.shape
-    result = np.zeros((height, width), np.bool_)
-    for i in range(height):
-        for j in range(width):
-            result[i, j] = labels[i, j] > 0 and moving[labels[i, j] - 1]
-    return result
 
 
 @compiled(DepthGrid, "int32[:, ::1], boolean[:, ::1], boolean[:, ::1], float64[:, :], boolean[::1]", Pose)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from hal.compiled import compiled
 from hal.types import FloatArray, Pose
 from vision.depth.connected import IntGrid
-from vision.depth.depth_grid import DepthGrid, FloatGrid
+from vision.depth.depth_grid import BoolGrid, DepthGrid, FloatGrid
 from vision.numerics.pose_axes import inner_vector
 from vision.numerics.relative_pose import NEAREST_M, coordinate_m, relative_row
 
@@ -145,4 +145,16 @@ def _counted(labels: IntGrid, cells: NDArray[np.intp], count: int) -> NDArray[np
     for cell in cells:
         if flat[cell] > 0:
             result[flat[cell] - 1] += 1
+    return result
+
+
+@compiled("int32[:, ::1], boolean[::1]")
+def cells_of(labels: IntGrid, chosen: NDArray[np.bool_]) -> BoolGrid:
+    """(h, w) the cells of tracks chosen (T,)."""
+    height, width = labels.shape
+    result = np.zeros((height, width), np.bool_)
+    for i in range(height):
+        for j in range(width):
+            if labels[i, j] > 0:
+                result[i, j] = chosen[labels[i, j] - 1]
     return result

@@ -128,6 +128,12 @@ def test_points_too_close_or_behind_the_camera_are_not_predicted() -> None:
     assert not masks.predict(before, BOTH, NO_SHIFT, grid_of(wall(3.0)), AT_ORIGIN).any()
 
 
+def test_cells_of_chosen_tracks() -> None:
+    np.testing.assert_array_equal(masks.cells_of(TWO, np.array([True, False])), LEFT_M > 0.0)
+    np.testing.assert_array_equal(masks.cells_of(TWO, np.array([True, True])), TWO > 0)
+    assert not masks.cells_of(TWO, np.array([False, False])).any()
+
+
 def test_cells_of_each_part_are_counted() -> None:
     cells = np.flatnonzero(LEFT_M > 0.0)
     assert masks.count_cells(TWO, cells, 2).tolist() == [len(cells), 0]
