@@ -17,7 +17,9 @@ odometry.
 Conflict with a trusted prior (from odometry, or from the kinematics of a tracked robot):
 
 * If nearly all points agree on a motion that contradicts the prior, the estimate is theirs, but it is marked
-  as disputed: the robot's tracks may slip, or everything in view may move.
+  as disputed: the robot's tracks may slip, or everything in view may move. Points of fragments that seemed
+  to move have no vote for that motion, but count against it if they are where the prior expects them. A
+  vehicle that filled the view was taken for static in the frames before; then what is static seems to move.
 * Otherwise the fit is repeated with a tighter prior. If the result still contradicts it, or too few points
   agree, the prior alone is the answer.
 
@@ -87,6 +89,26 @@ class CameraEstimate:
         return self.noise_scale > 1.0
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Points:
+    """Anchored points, and where the camera sees them now, pixels (N, 2)."""
+
+    anchors: Anchors
+    pixels: FloatArray
+    camera: Intrinsics
+
+    def usable(self) -> View:
+        """The points from which the motion is estimated."""
+        return view_of(self.anchors, self.pixels, self.anchors.usable.nonzero()[0], self.camera)
+
+    def left_out_that_fit(self, start: Pose, sigma: FloatArray) -> int:
+        """Number of points of seeming movers that are where the prior expects what is static."""
+        left_out = self.anchors.left_out.nonzero()[0]
+        if not len(left_out):
+            return 0
+        return fit(view_of(self.anchors, self.pixels, left_out, self.camera), start, sigma).inliers
+
+
 def estimate(
     anchors: Anchors,
     pixels: FloatArray,
@@ -99,17 +121,17 @@ def estimate(
 
     before: pose of the camera in the frame before, in the fixed frame. sweep: prior of the sweep.
     """
-    start, use = before @ prior.motion, anchors.usable.nonzero()[0]
-    if len(use) < _MIN_POINTS:
+    start, points = before @ prior.motion, _Points(anchors, pixels, camera)
+    view = points.usable()
+    if len(view.seen) < _MIN_POINTS:
         return _prior_only(start, np.concatenate((prior.sigma, sweep.sigma_rad)), float("nan"))
-    view = view_of(anchors, pixels, use, camera)
     first, sigma, bend = _fit_with_sweep(view, start, prior, sweep)
-    found = _checked(view, start, prior, first, sigma, bend)
+    found = _checked(points, view, start, prior, first, sigma, bend)
     if prior.source != "none" or found.disputed or found.inlier_ratio >= MIN_AGREEMENT:
         return found
     scale = _noise_scale(view, first)
     noisier = view.with_pixel_variance(scale)
-    again = _checked(noisier, start, prior, *_fit_with_sweep(noisier, start, prior, sweep))
+    again = _checked(points, noisier, start, prior, *_fit_with_sweep(noisier, start, prior, sweep))
     if again.visual and again.inlier_ratio >= MIN_AGREEMENT:
         return replace(again, inlier_ratio=found.inlier_ratio, noise_scale=scale)
     return found
@@ -121,6 +143,7 @@ def _noise_scale(view: View, found: Fit) -> float:
 
 
 def _checked(
+    points: _Points,
     view: View,
     start: Pose,
     prior: MotionPrior,
@@ -129,24 +152,24 @@ def _checked(
     bend: tuple[FloatArray, FloatArray],
 ) -> CameraEstimate:
     """The estimate from a fit and the sigma of its prior, if it does not contradict a trusted prior."""
-    points = len(view.seen)
-    least = max(_MIN_POINTS, _MIN_INLIER_RATIO * points)
+    count = len(view.seen)
+    least = max(_MIN_POINTS, _MIN_INLIER_RATIO * count)
     conflicts = prior.trusted and _conflict(found, prior.sigma)
     disputed = False
     if conflicts:
         # If the prior is far off, its gate excludes the points that contradict it. Fit with a wide one.
         freely = fit(view, start, sigma * _LOOSE_SHARE)
-        disputed = freely.inliers >= _UNANIMOUS_RATIO * points
+        disputed = _is_unanimous(freely.inliers, count, points, start, sigma)
         if disputed:
             found = freely
         else:
             # The fit has followed something large that moves. The ground is what agrees with the prior.
             found = fit(view, start, sigma * _TRUSTED_SHARE)
-            least = max(_MIN_POINTS, _MIN_BACKGROUND_RATIO * points)
+            least = max(_MIN_POINTS, _MIN_BACKGROUND_RATIO * count)
             # If it is still far from the prior, too little of the ground is in view to correct the prior.
             conflicts = _conflict(found, prior.sigma)
         bend = _bend(found)
-    ratio = found.inliers / points
+    ratio = found.inliers / count
     # Without an inverse OpenCV returns zeros, which would mean perfect knowledge: check regular below.
     regular, covariance = cv2.invert(found.information, flags=cv2.DECOMP_CHOLESKY)
     if found.inliers < least or (conflicts and not disputed) or not regular:
@@ -162,6 +185,13 @@ def _checked(
         visual=not disputed,
         disputed=disputed,
     )
+
+
+def _is_unanimous(agree: int, count: int, points: _Points, start: Pose, sigma: FloatArray) -> bool:
+    """Whether nearly all agree, of count usable points and of those left out which fit the prior."""
+    if agree < _UNANIMOUS_RATIO * count:
+        return False
+    return agree >= _UNANIMOUS_RATIO * (count + points.left_out_that_fit(start, sigma))
 
 
 def _fit_with_sweep(

@@ -22,6 +22,7 @@ class Anchors:
     depth_sigma_m: standard deviation of depth, (N,).
     pixel_cov: covariance xx, xy, yy of where they are seen now, px^2, (N, 3).
     usable: (N,).
+    left_out: not usable, but only because their fragment is excluded as one that moves, (N,).
     """
 
     points_m: Matrix
@@ -29,6 +30,7 @@ class Anchors:
     depth_sigma_m: Vector
     pixel_cov: Matrix
     usable: Flags
+    left_out: Flags
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -70,13 +70,15 @@ def static_points(
     still measures the camera's rotation, across its epipolar line. In a wide hall there may be hardly any
     other ends.
     """
-    points_m, sigma_m, usable = _static(anchor, depths, moving, distant_m)
+    points_m, sigma_m, definite = _static(anchor, depths, distant_m)
+    of_movers = moving.repeat(2)
     return Anchors(
         points_m=points_m,
         range_m=anchor.direction.T,
         depth_sigma_m=sigma_m,
         pixel_cov=pixel_cov.reshape(-1, 3).astype(float),
-        usable=usable,
+        usable=definite & ~of_movers,
+        left_out=definite & of_movers,
     )
 
 
@@ -117,13 +119,13 @@ def _with_sigma(
     return near, sigma, far, known, mixed
 
 
-@compiled(AnchorEnds, AnchorDepths, "bool[:], float64")
+@compiled(AnchorEnds, AnchorDepths, "float64")
 def _static(
-    anchor: AnchorEnds, depths: AnchorDepths, moving: NDArray[np.bool_], distant_m: float
+    anchor: AnchorEnds, depths: AnchorDepths, distant_m: float
 ) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
-    """points_m, depth_sigma_m and usable of Anchors."""
+    """points_m and depth_sigma_m of Anchors; (2N,) which ends are on one surface, or measure the rotation."""
     count = len(depths.near_m)
-    points_m, sigma_m, usable = np.empty((count, 3)), depths.sigma_m.copy(), np.empty(count, np.bool_)
+    points_m, sigma_m, definite = np.empty((count, 3)), depths.sigma_m.copy(), np.empty(count, np.bool_)
     for k in range(count):
         near_m, far_m, mixed = depths.near_m[k], depths.far_m[k], depths.mixed[k]
         for i in range(3):
@@ -131,8 +133,8 @@ def _static(
         distant = mixed and far_m > distant_m
         if distant:
             sigma_m[k] = max(sigma_m[k], far_m - near_m)
-        usable[k] = (distant or not mixed) and not moving[k // 2]
-    return points_m, sigma_m, usable
+        definite[k] = distant or not mixed
+    return points_m, sigma_m, definite
 
 
 @compiled(AnchorEnds, "float32[:, :], float32[:, :]", Pose, DepthNoise)

@@ -35,7 +35,14 @@ def anchors(count: int = 160, seed: int = 7) -> Anchors:
     direction = rays(pixels, CAMERA)
     points = direction * rng.uniform(2.0, 8.0, count)[:, None]
     covariance = np.tile([0.02, 0.0, 0.02], (count, 1))
-    return Anchors(points, direction, np.full(count, 0.02), covariance, np.ones(count, np.bool_))
+    return Anchors(
+        points,
+        direction,
+        np.full(count, 0.02),
+        covariance,
+        np.ones(count, np.bool_),
+        np.zeros(count, np.bool_),
+    )
 
 
 def seen(points_m: FloatArray, motion: Pose = TRUE, noise_px: float = 0.0) -> FloatArray:
@@ -86,6 +93,7 @@ def test_the_motion_starts_from_where_the_camera_was() -> None:
         local.depth_sigma_m,
         local.pixel_cov,
         local.usable,
+        local.left_out,
     )
     found = estimate(placed, seen(local.points_m), before, nothing_known(), GLOBAL_SHUTTER, CAMERA)
     metres, radians = off(found, before @ TRUE)

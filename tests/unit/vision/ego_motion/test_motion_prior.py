@@ -71,7 +71,9 @@ def seen_mps(prior: MotionPrior, ahead_mps: float, crowd_mps: tuple[float, float
     direction = rays(pixels, CAMERA)
     points = direction * rng.uniform(2.0, 6.0, 90)[:, None]
     covariance = np.tile([0.02, 0.0, 0.02], (90, 1))
-    anchors = Anchors(points, direction, np.full(90, 0.02), covariance, np.ones(90, np.bool_))
+    anchors = Anchors(
+        points, direction, np.full(90, 0.02), covariance, np.ones(90, np.bool_), np.zeros(90, np.bool_)
+    )
     now: FloatArray = points.copy()
     now[:60, 0] += crowd_mps[0] * DT_S
     now[:60, 2] += crowd_mps[1] * DT_S

@@ -81,6 +81,7 @@ def found_from(
         np.full(len(world), 0.02),
         np.tile([0.02, 0.0, 0.02], (len(world), 1)),
         np.ones(len(world), np.bool_),
+        np.zeros(len(world), np.bool_),
     )
     pixels = bent(world, truth, sweep_rad) + noise
     sweep = SweepPrior(np.full(2, sigma_rad), np.full(2, max_rad or sigma_rad))
