@@ -166,7 +166,7 @@ def _reel_figures(
     def make() -> Perception:
         return Perception(config, reel.mount, body.height_m, body.clearance_m)
 
-    with progress(label, 2 * passes * len(reel.frames)) as tick:
+    with progress(label, 3 * passes * len(reel.frames)) as tick:
         return measure_perception(reel, make, config.fragments, passes, _stopwatches, tick)
 
 

@@ -1,4 +1,8 @@
-"""Measures perception, compares it with its bare OpenCV calls on the same images, and times its functions."""
+"""Measures perception alone, beside its bare OpenCV calls on the same images, and function by function.
+
+Alone is how it runs on a robot. Beside the calls that it is compared with it takes longer, because they leave
+other data in the caches of the processor: both sides of a ratio are measured in the same way.
+"""
 
 from __future__ import annotations
 
@@ -42,6 +46,7 @@ class FrameTime:
 class PairedTimes:
     """Times of each frame for perception and for OpenCV alone; the same index is the same frame.
 
+    alone_ns: processor time of perception with nothing in between.
     detect_ns, track_ns: processor time of the two steps of perception.
     elapsed_ns: elapsed time of both together.
     bare_ns: processor time of the bare OpenCV calls, with OpenCV's Lucas-Kanade (own_search.py).
@@ -50,6 +55,7 @@ class PairedTimes:
     first_ns: the first frame of each pass, which is in none of the other lists.
     """
 
+    alone_ns: list[int] = field(default_factory=list)
     detect_ns: list[int] = field(default_factory=list)
     track_ns: list[int] = field(default_factory=list)
     elapsed_ns: list[int] = field(default_factory=list)
@@ -81,8 +87,9 @@ class PairedTimes:
 class PerceptionFigures:
     """Figures of one reel, per frame.
 
-    total: detect and track together, in processor time.
-    elapsed: the same in wall-clock time.
+    alone: detect and track together, in processor time, with nothing in between.
+    total: the same beside what it is compared with.
+    elapsed: total in wall-clock time.
     bare: the same OpenCV calls alone, with OpenCV's Lucas-Kanade in place of perception's own.
     whole: the paper's calls on whole images.
     first: the first frame of each pass.
@@ -93,6 +100,7 @@ class PerceptionFigures:
     modules, functions: time inside perception, by names as in the code.
     """
 
+    alone: Durations
     total: Durations
     elapsed: Durations
     detect: Durations
@@ -110,6 +118,7 @@ class PerceptionFigures:
     def as_json(self) -> dict[str, object]:
         """Plain values."""
         return {
+            "alone": self.alone.as_json(),
             "total": self.total.as_json(),
             "elapsed": self.elapsed.as_json(),
             "detect": self.detect.as_json(),
@@ -134,14 +143,16 @@ def measure_perception(
     stopwatches: Stopwatches,
     tick: Tick,
 ) -> PerceptionFigures:
-    """Measure side by side first, then again with a stopwatch on every function.
+    """Measure alone, then side by side, then with a stopwatch on every function.
 
     make: makes a new perception, for each pass over reel.
     settings: of its fragments.
-    tick: called twice a frame and pass.
+    tick: called three times a frame and pass.
     """
     modules = modules_of(vision)
     times = PairedTimes()
+    for _ in range(passes):
+        run_alone(reel, make, stopwatches, times, tick)
     for _ in range(passes):
         run_side_by_side(reel, make, settings, modules, stopwatches, times, tick)
     spent: list[dict[str, FunctionTime]] = []
@@ -150,6 +161,7 @@ def measure_perception(
     total, bare = Durations.of(times.total_ns), Durations.of(times.bare_ns)
     whole = Durations.of(times.whole_ns)
     return PerceptionFigures(
+        alone=Durations.of(times.alone_ns),
         total=total,
         elapsed=Durations.of(times.elapsed_ns),
         detect=Durations.of(times.detect_ns),
@@ -164,6 +176,18 @@ def measure_perception(
         modules=summarise(spent, group=_module_of),
         functions=summarise(spent),
     )
+
+
+def run_alone(
+    reel: Reel, make: MakePerception, stopwatches: Stopwatches, result: PairedTimes, tick: Tick
+) -> None:
+    """Process every frame with nothing in between; add alone_ns to result, without the first frame."""
+    perception = make()
+    for index, (frame, odometry) in enumerate(zip(reel.frames, reel.odometry, strict=True)):
+        spent = _time(perception, frame, odometry, stopwatches)
+        if index > 0:
+            result.alone_ns.append(spent.detect_ns + spent.track_ns)
+        tick()
 
 
 def run_side_by_side(

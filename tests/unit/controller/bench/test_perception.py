@@ -16,6 +16,7 @@ from controller.bench.perception import (
     FrameTime,
     PairedTimes,
     measure_perception,
+    run_alone,
     run_side_by_side,
     time_functions,
 )
@@ -83,6 +84,14 @@ def test_side_by_side_times_perception_and_its_calls(reel: Reel) -> None:
     assert ticks.count == 3
 
 
+def test_alone_times_perception_only(reel: Reel) -> None:
+    side, ticks = PairedTimes(), Ticks()
+    run_alone(reel, make, Stopwatches(steady_clock(1000).__next__, steady_clock(7).__next__), side, ticks)
+    assert side.alone_ns == [2000, 2000]
+    assert side.total_ns == []
+    assert ticks.count == 3
+
+
 def test_a_watched_pass_sees_the_stages(reel: Reel) -> None:
     frames = time_functions(reel, make, MODULES, time.perf_counter_ns, Ticks())
     assert len(frames) == 2
@@ -95,15 +104,15 @@ def test_figures_of_a_reel(reel: Reel) -> None:
     ticks = Ticks()
     stopwatches = Stopwatches(time.process_time_ns, time.perf_counter_ns)
     figures = measure_perception(reel, make, SETTINGS, 2, stopwatches, ticks)
-    assert ticks.count == 2 * 2 * 3
-    assert figures.total.count == figures.bare.count == 4
+    assert ticks.count == 3 * 2 * 3
+    assert figures.alone.count == figures.total.count == figures.bare.count == 4
     assert figures.first.count == 2
     assert figures.ratio_of_medians == pytest.approx(figures.total.median_ms / figures.bare.median_ms)
     assert figures.ratio_to_whole == pytest.approx(figures.total.median_ms / figures.whole.median_ms)
     assert {"vision.fragments.edges", "vision.tracker"} <= set(figures.modules)
     assert "vision.fragments.edges.find_edges" in figures.functions
     assert set(figures.as_json()) == {
-        "total", "elapsed", "detect", "track", "bare_opencv", "whole_images", "first_frame",
+        "alone", "total", "elapsed", "detect", "track", "bare_opencv", "whole_images", "first_frame",
         "ratio_of_medians", "median_ratio", "ratio_to_whole_images", "opencv_functions", "modules",
         "functions",
     }  # fmt: skip
