@@ -11,7 +11,7 @@ from controller.campaign.judge import Row
 from controller.campaign.policies import FIELD, OURS, PAPER, POLICY_NAMES, ZONES
 from controller.campaign.summary import Summary
 from controller.campaign.task import time_ratio
-from controller.evaluation.chart import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, Axis, Chart, blank
+from controller.evaluation.report.chart import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, Axis, Chart, blank
 from controller.video import text
 from controller.video.style import Colour, Image, Rect
 

@@ -18,7 +18,7 @@ from controller.campaign.judge import Row
 from controller.campaign.own_scenarios import KEPT
 from controller.campaign.summary import Summary, Totals, summarise
 from controller.errors import UserError
-from controller.evaluation import markdown
+from controller.evaluation.report import markdown
 
 _MAX_FAILED_ROWS = 40
 

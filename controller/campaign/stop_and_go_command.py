@@ -24,7 +24,7 @@ from controller.campaign.stage import Stage
 from controller.campaign.stop_and_go import StopAndGo
 from controller.campaign.task import Mode
 from controller.errors import UserError
-from controller.evaluation import markdown
+from controller.evaluation.report import markdown
 from controller.terminal.outlet import say
 from sim.families.step_in import step_in
 

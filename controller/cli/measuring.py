@@ -96,7 +96,7 @@ def evaluate(
     Writes a report: the paper's tables and figures. It names the goals that are missed; the exit code is 0
     all the same.
     """
-    from controller.evaluation.evaluate import EvaluationOptions, run_evaluation
+    from controller.evaluation.command import EvaluationOptions, run_evaluation
 
     run_evaluation(
         EvaluationOptions(recordings, simulated, report, odometry, static, baselines, only, workers, quiet)

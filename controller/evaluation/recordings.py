@@ -20,10 +20,10 @@ from config.camera import OdometryChoice
 from controller.build import open_replay
 from controller.build_replay import build_replay_perceiver
 from controller.errors import UserError
-from controller.evaluation.ours import detection_of
+from controller.evaluation.methods.ours import detection_of
 from controller.evaluation.run_sequence import Snapshot
-from controller.evaluation.scoring import WRONG_FRAMES, FrameScore
-from controller.evaluation.totals import ratio
+from controller.evaluation.scores.scoring import WRONG_FRAMES, FrameScore
+from controller.evaluation.scores.totals import ratio
 from controller.evaluation.types import FrameTruth
 from controller.perceive import Look
 from hal.clocks import NS_PER_S

@@ -8,23 +8,22 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.evaluation.eligibility import MOVING_MPS, OBJECT_REST_MPS
-from controller.evaluation.endpoint_error import EndpointErrors, endpoint_errors
-from controller.evaluation.ours import Treadwatch
-from controller.evaluation.pixels import STEP_PX, claimed_levels, count_pixels
-from controller.evaluation.scoring import FrameScore, score
-from controller.evaluation.sequences import Sequence
-from controller.evaluation.simulate import SimulatedFrame, simulate
-from controller.evaluation.timed_methods import (
+from controller.evaluation.methods.ours import Treadwatch
+from controller.evaluation.methods.timed_methods import (
     OURS,
     CameraMethod,
     Stopwatch,
     TimedMethod,
     build_methods,
-    build_world,
 )
-from controller.evaluation.totals import PixelCounts
-from controller.evaluation.truth import FrameTruthBuilder
+from controller.evaluation.scores.endpoint_error import EndpointErrors, endpoint_errors
+from controller.evaluation.scores.pixels import STEP_PX, claimed_levels, count_pixels
+from controller.evaluation.scores.scoring import FrameScore, score
+from controller.evaluation.scores.totals import PixelCounts
+from controller.evaluation.simulated_set.eligibility import MOVING_MPS, OBJECT_REST_MPS
+from controller.evaluation.simulated_set.sequences import Sequence
+from controller.evaluation.simulated_set.simulate import SimulatedFrame, build_world, simulate
+from controller.evaluation.simulated_set.truth import FrameTruthBuilder
 from controller.evaluation.types import DetectedObject, FrameDetections, FrameTruth, MethodOutput
 from hal.types import ColourImage, RgbdFrame
 from sim.rendering.camera import intrinsics_of

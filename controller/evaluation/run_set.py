@@ -11,9 +11,9 @@ from typing import Literal
 
 import cv2
 
+from controller.evaluation.methods.timed_methods import ALWAYS, BASELINES
 from controller.evaluation.run_sequence import SequenceRecord, run_sequence
-from controller.evaluation.sequences import Sequence
-from controller.evaluation.timed_methods import ALWAYS, BASELINES
+from controller.evaluation.simulated_set.sequences import Sequence
 from controller.workers import worker_processes
 
 Baselines = Literal["none", "some", "all"]

@@ -16,11 +16,11 @@ from click.testing import CliRunner
 from config.app import ReplayConfig
 from controller.cli.commands import cli
 from controller.errors import UserError
-from controller.evaluation.evaluate import EvaluationOptions, choose, command_of, run_evaluation
-from controller.evaluation.pictures import result_picture
-from controller.evaluation.recording_report import recording_lines, write_recording_pictures
+from controller.evaluation.command import EvaluationOptions, choose, command_of, run_evaluation
 from controller.evaluation.recordings import distinct_names, evaluate_recording
-from controller.evaluation.sequences import sequences
+from controller.evaluation.report.pictures import result_picture
+from controller.evaluation.report.recordings_part import recording_lines, write_recording_pictures
+from controller.evaluation.simulated_set.sequences import sequences
 from hal.errors import BadRecording
 
 DESK = Path(__file__).parents[3] / "recordings" / "desk_rpy"
