@@ -5,14 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, PrivateAttr, model_validator
 
 from config.camera import AnyCameraConfig, CameraConfig, ReplayCameraConfig, SimulatedCameraConfig
 from config.chassis import ChassisConfig
 from config.chassis_checks import check_protocol, check_top_speed, check_turns
 from config.decision import DecisionConfig
 from config.governor import GovernorConfig
-from config.loader import Section, load, read_yaml
+from config.loader import Section, load, read_yaml, resolve
 from config.path import PathSpec
 from config.perception import PerceptionConfig
 from config.plant import PlantConfig
@@ -128,7 +128,10 @@ def _check_frames(
 
 
 class AppConfig(Section):
-    """What `treadwatch run` and `treadwatch govern` read with --config FILE."""
+    """What `treadwatch run` and `treadwatch govern` read with --config FILE.
+
+    It knows its file: the files that it names are beside it. Copies know it, too, also in another process.
+    """
 
     robot: Robot = Robot()
     camera: CameraConfig
@@ -142,6 +145,18 @@ class AppConfig(Section):
         description="another planner commands the robot, in place of a path: `treadwatch govern`",
     )
     runner: RunnerConfig
+
+    # Without a file, names are relative to the working directory, and messages say this.
+    _file: Path = PrivateAttr(default=Path("configuration"))
+
+    @property
+    def file(self) -> Path:
+        """The YAML that this was read from."""
+        return self._file
+
+    def resolve(self, name: str) -> Path:
+        """The path of a file that this configuration names (config/loader.py)."""
+        return resolve(name, self._file)
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
@@ -206,7 +221,9 @@ class AppConfig(Section):
 
 def load_app(path: Path) -> AppConfig:
     """Read and check one program's YAML. Raises ConfigError."""
-    return load(path, AppConfig)
+    config = load(path, AppConfig)
+    config._file = path
+    return config
 
 
 class ReplayConfig(Section):

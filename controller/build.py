@@ -13,7 +13,7 @@ from typing import assert_never
 
 import cv2
 
-from config.app import AppConfig, SimulationConfig
+from config.app import AppConfig
 from config.camera import (
     OdometryChoice,
     RealsenseCameraConfig,
@@ -21,8 +21,7 @@ from config.camera import (
     SimulatedCameraConfig,
 )
 from config.faults import NO_FAULTS, Faults
-from config.governor import InputConfig, UdpInputConfig, UnixInputConfig
-from config.loader import resolve
+from config.governor import UdpInputConfig, UnixInputConfig
 from config.path import LineSpec, PathSpec
 from config.robot import Robot
 from config.scenario import Scenario, load_scenario
@@ -69,32 +68,32 @@ def limit_vision_threads() -> None:
     cv2.setNumThreads(1)
 
 
-def scenario_of(simulation: SimulationConfig, config_path: FilePath) -> Scenario:
-    """The world of a simulation. Raises ConfigError."""
-    if simulation.scenario.endswith((".yaml", ".yml")):
-        return load_scenario(resolve(simulation.scenario, config_path))
-    return load_scenario(simulation.scenario)
+def scenario_of(config: AppConfig) -> Scenario:
+    """The world that is simulated. Raises ConfigError."""
+    assert config.simulation is not None, "AppConfig asks for a simulation"
+    scenario = config.simulation.scenario
+    return load_scenario(config.resolve(scenario) if scenario.endswith((".yaml", ".yml")) else scenario)
 
 
-def path_spec(config: AppConfig, config_path: FilePath) -> tuple[str, PathSpec]:
+def path_spec(config: AppConfig) -> tuple[str, PathSpec]:
     """Name of the file with the route (the program's YAML, or the scenario), and the route.
 
     Raises ConfigError.
     """
     if config.path is not None:
-        return str(config_path), config.path
+        return str(config.file), config.path
     assert config.simulation is not None, "AppConfig asks for a path or a simulation"
-    return config.simulation.scenario, scenario_of(config.simulation, config_path).path
+    return config.simulation.scenario, scenario_of(config).path
 
 
-def build_path(config: AppConfig, config_path: FilePath) -> Path:
+def build_path(config: AppConfig) -> Path:
     """The route, from the program's YAML or from the scenario. Raises ConfigError, PathError.
 
     A governed robot has a route in a simulation only; otherwise a straight one is returned.
     """
     if config.path is None and config.simulation is None:
         return straight_ahead(config.robot)
-    where, spec = path_spec(config, config_path)
+    where, spec = path_spec(config)
     try:
         return Path(spec, config.robot)
     except PathError as error:
@@ -112,9 +111,9 @@ def build_perceiver(
     return Perceiver(perception, odometry, body_pose, stopwatch_ns)
 
 
-def build_control(config: AppConfig, config_path: FilePath, chassis: Chassis) -> ControlLoop:
+def build_control(config: AppConfig, chassis: Chassis) -> ControlLoop:
     """Decide, shape and follow, for a chassis that is opened elsewhere. Raises ConfigError, PathError."""
-    return build_control_loop(config, build_path(config, config_path), build_decision(config), chassis)
+    return build_control_loop(config, build_path(config), build_decision(config), chassis)
 
 
 def build_decision(config: AppConfig) -> DecisionMaker:
@@ -138,33 +137,31 @@ def build_control_loop(config: AppConfig, path: Path, decide: Decides, chassis: 
     )
 
 
-def open_camera(
-    config: AppConfig, config_path: FilePath, clock: Clock, body_pose: BodyPose, start_ns: int
-) -> FrameSource:
+def open_camera(config: AppConfig, clock: Clock, body_pose: BodyPose, start_ns: int) -> FrameSource:
     """The camera that the YAML names, not yet entered. start_ns: time zero of a simulated world."""
     match config.camera:
         case SimulatedCameraConfig():
-            faulty = open_faulty_camera(config, config_path, clock, body_pose, start_ns)
-            return LateCamera(faulty, build_faults(config, config_path), clock, start_ns)
+            faulty = open_faulty_camera(config, clock, body_pose, start_ns)
+            return LateCamera(faulty, build_faults(config), clock, start_ns)
         case RealsenseCameraConfig() as camera:
             return RealsenseCamera(camera, clock)
         case ReplayCameraConfig() as camera:
-            return PacedRecording(_recording(camera, config_path), clock)
+            return PacedRecording(_recording(config, camera), clock)
         case unknown:
             assert_never(unknown)
 
 
-def require_camera(config: AppConfig, config_path: FilePath) -> None:
+def require_camera(config: AppConfig) -> None:
     """Check that a recording can be opened before a robot is armed; another process will read it.
 
     Raises HalError.
     """
     if isinstance(config.camera, ReplayCameraConfig):
-        _recording(config.camera, config_path)
+        _recording(config, config.camera)
 
 
-def _recording(camera: ReplayCameraConfig, config_path: FilePath) -> Recording:
-    path = resolve(camera.folder, config_path)
+def _recording(config: AppConfig, camera: ReplayCameraConfig) -> Recording:
+    path = config.resolve(camera.folder)
     wanted = WantedTopics(camera.colour_topic, camera.depth_topic)
     if is_bag(path):
         return BagReplay(path, "none", wanted, camera.max_pair_gap_s)
@@ -173,13 +170,13 @@ def _recording(camera: ReplayCameraConfig, config_path: FilePath) -> Recording:
 
 
 def open_simulated_camera(
-    config: AppConfig, config_path: FilePath, clock: Clock, body_pose: BodyPose, start_ns: int
+    config: AppConfig, clock: Clock, body_pose: BodyPose, start_ns: int
 ) -> SimulatedCamera:
     """A camera in the scenario's world; the robot is at the path's start until body_pose tells its pose."""
     assert isinstance(config.camera, SimulatedCameraConfig)
-    start = build_path(config, config_path).start
+    start = build_path(config).start
     return SimulatedCamera(
-        build_world(config, config_path),
+        build_world(config),
         config.camera,
         mount_of(config.robot),
         clock,
@@ -188,42 +185,36 @@ def open_simulated_camera(
     )
 
 
-def open_faulty_camera(
-    config: AppConfig, config_path: FilePath, clock: Clock, body_pose: BodyPose, start_ns: int
-) -> FaultyCamera:
+def open_faulty_camera(config: AppConfig, clock: Clock, body_pose: BodyPose, start_ns: int) -> FaultyCamera:
     """The same camera with the faults of the scenario, except late frames, which the loop or LateCamera
     delays."""
-    camera = open_simulated_camera(config, config_path, clock, body_pose, start_ns)
-    assert config.simulation is not None, "AppConfig asks for a simulation"
-    scenario = scenario_of(config.simulation, config_path)
+    camera = open_simulated_camera(config, clock, body_pose, start_ns)
+    scenario = scenario_of(config)
     glass = tuple(number for number, body in enumerate(scenario.bodies, start=1) if body.glass)
     return FaultyCamera(camera, scenario.faults, glass)
 
 
-def build_faults(config: AppConfig, config_path: FilePath) -> Faults:
+def build_faults(config: AppConfig) -> Faults:
     """What goes wrong in the scenario that is simulated. Raises ConfigError."""
-    return NO_FAULTS if config.simulation is None else scenario_of(config.simulation, config_path).faults
+    return NO_FAULTS if config.simulation is None else scenario_of(config).faults
 
 
-def build_simulation(
-    config: AppConfig, config_path: FilePath, emulator: Emulator, start_ns: int
-) -> Simulation:
+def build_simulation(config: AppConfig, emulator: Emulator, start_ns: int) -> Simulation:
     """The emulated base in the scenario's world, with a referee. start_ns: the world's time zero."""
-    referee = Referee(build_world(config, config_path), config.robot.body, start_ns)
-    lost_s = build_faults(config, config_path).feedback_lost_s
+    referee = Referee(build_world(config), config.robot.body, start_ns)
+    lost_s = build_faults(config).feedback_lost_s
     return Simulation(emulator, referee, None if lost_s is None else start_ns + round(lost_s * NS_PER_S))
 
 
-def build_world(config: AppConfig, config_path: FilePath) -> World:
+def build_world(config: AppConfig) -> World:
     """The scenario that is simulated. Raises ConfigError."""
     assert config.simulation is not None, "AppConfig asks for a simulation"
-    return World(scenario_of(config.simulation, config_path), config.simulation.seed)
+    return World(scenario_of(config), config.simulation.seed)
 
 
-def build_still_world(config: AppConfig, config_path: FilePath) -> World:
+def build_still_world(config: AppConfig) -> World:
     """The scenario that is simulated without its movers. Raises ConfigError."""
-    assert config.simulation is not None, "AppConfig asks for a simulation"
-    scenario = scenario_of(config.simulation, config_path)
+    scenario = scenario_of(config)
     still = tuple(body for body in scenario.bodies if body.motion is None)
     return World(scenario.model_copy(update={"bodies": still}))
 
@@ -244,13 +235,14 @@ def _fps(config: AppConfig) -> float:
     return REPLAY_FPS if isinstance(config.camera, ReplayCameraConfig) else float(config.camera.fps)
 
 
-def open_commands(config: InputConfig, config_path: FilePath) -> DatagramLink:
+def open_commands(config: AppConfig) -> DatagramLink:
     """The socket at which a governor's commands arrive, not yet entered."""
-    match config:
-        case UdpInputConfig():
-            return UdpSocket(config.host, config.port)
-        case UnixInputConfig():
-            return UnixSocket(resolve(config.path, config_path), config.group_may_command)
+    assert config.governor is not None, "checked by controller/governor/command.py"
+    match config.governor.input:
+        case UdpInputConfig() as udp:
+            return UdpSocket(udp.host, udp.port)
+        case UnixInputConfig() as unix:
+            return UnixSocket(config.resolve(unix.path), unix.group_may_command)
         case unknown:
             assert_never(unknown)
 

@@ -5,8 +5,6 @@ All other faults happen in what controller/build.py makes of the scenario.
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from config.app import AppConfig
 from config.camera import SimulatedCameraConfig
 from config.faults import Faults
@@ -16,19 +14,19 @@ from controller.build import build_faults
 _OF_THE_BASE = ("yaw_slip", "distance_slip", "feedback_lost_s")
 
 
-def with_scenario_faults(config: AppConfig, config_path: Path) -> AppConfig:
+def with_scenario_faults(config: AppConfig) -> AppConfig:
     """The configuration with the slip and the vibration that its scenario asks for. Raises ConfigError."""
-    return with_slip_and_vibration(config, build_faults(config, config_path))
+    return with_slip_and_vibration(config, build_faults(config))
 
 
-def unused_faults_warning(config: AppConfig, config_path: Path) -> str | None:
+def unused_faults_warning(config: AppConfig) -> str | None:
     """One line that names the faults of the scenario that an external base does not have; None without any.
 
     Raises ConfigError.
     """
     if config.simulation is None or config.simulation.base == "emulated":
         return None
-    faults = build_faults(config, config_path)
+    faults = build_faults(config)
     unused = [name for name in _OF_THE_BASE if getattr(faults, name) is not None]
     if not unused:
         return None

@@ -134,10 +134,9 @@ def _simulated_camera(config: AppConfig, plan: Plan, width: int, height: int) ->
     assert isinstance(config.camera, SimulatedCameraConfig), "the mission's camera is simulated"
     middle = {"cx": 0.5 * (width - 1), "cy": 0.5 * (height - 1)}
     camera = config.camera.model_copy(update={"width": width, "height": height, **middle})
-    path = build_path(config, plan.mission)
+    path = build_path(config)
     return open_simulated_camera(
         config.model_copy(update={"camera": camera}),
-        plan.mission,
         SimulatedClock(),
         lambda stamp_ns: cruise(path, stamp_ns),
         start_ns=0,
@@ -145,7 +144,7 @@ def _simulated_camera(config: AppConfig, plan: Plan, width: int, height: int) ->
 
 
 def _simulated_reel_figures(config: AppConfig, plan: Plan, width: int, height: int) -> PerceptionFigures:
-    camera, path = _simulated_camera(config, plan, width, height), build_path(config, plan.mission)
+    camera, path = _simulated_camera(config, plan, width, height), build_path(config)
     size = f"{width}x{height}"
     with progress(f"rendering frames, {size}", plan.frames) as tick:
         reel = render_reel(camera, path, mount_of(config.robot), plan.frames, tick)
@@ -173,7 +172,7 @@ def _reel_figures(
 def _renderer_figures(config: AppConfig, plan: Plan) -> RendererFigures:
     assert config.simulation is not None, "the mission is simulated"
     camera = _simulated_camera(config, plan, *plan.sizes[0])
-    world = World(scenario_of(config.simulation, plan.mission), config.simulation.seed)
+    world = World(scenario_of(config), config.simulation.seed)
     renderer = Renderer(world, camera.intrinsics)
     with progress("renderer", plan.pictures + 1) as tick:
         return measure_renderer(camera, renderer, plan.pictures, _stopwatches.processor_ns, tick)
@@ -182,13 +181,13 @@ def _renderer_figures(config: AppConfig, plan: Plan) -> RendererFigures:
 def _control_figures(config: AppConfig, plan: Plan) -> ControlFigures:
     """Measure the control step, without the exchange of the mission's chassis driver."""
     timed, emulator = _base(config, plan)
-    loop = build_control(config, plan.mission, timed)
+    loop = build_control(config, timed)
     with progress("control step", plan.control_steps) as tick:
         return measure_control(loop, timed, emulator, plan.control_steps, _stopwatches.processor_ns, tick)
 
 
 def _base(config: AppConfig, plan: Plan) -> tuple[TimedChassis, Emulator]:
-    chassis, emulator = build_base(config, build_path(config, plan.mission).start, 0)
+    chassis, emulator = build_base(config, build_path(config).start, 0)
     assert emulator is not None, "the mission's base is emulated"
     return TimedChassis(chassis, _stopwatches.processor_ns), emulator
 
@@ -196,4 +195,4 @@ def _base(config: AppConfig, plan: Plan) -> tuple[TimedChassis, Emulator]:
 def _lockstep_figures(config: AppConfig, plan: Plan) -> LockstepFigures:
     steps = round(plan.duration_s * config.runner.control_rate_hz)
     with progress("lock-step mission", steps) as tick:
-        return measure_lockstep(config, plan.mission, plan.duration_s, _stopwatches, tick)
+        return measure_lockstep(config, plan.duration_s, _stopwatches, tick)

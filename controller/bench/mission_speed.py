@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path as FilePath
 
 from config.app import AppConfig, LockstepRunner
 from controller.bench.figures import Stopwatches
@@ -57,21 +56,19 @@ class LockstepFigures:
 
 
 def measure_lockstep(
-    config: AppConfig, config_path: FilePath, duration_s: float, stopwatches: Stopwatches, tick: Tick
+    config: AppConfig, duration_s: float, stopwatches: Stopwatches, tick: Tick
 ) -> LockstepFigures:
     """Drive the first duration_s of the mission in config, without recording. Start-up is not counted."""
     clock = SimulatedClock()
     runner = config.runner
     assert isinstance(runner, LockstepRunner), "the bench drives a simulated mission"
     runner = runner.model_copy(update={"max_duration_s": duration_s})
-    chassis, emulator = build_base(config, build_path(config, config_path).start, clock.now_ns())
+    chassis, emulator = build_base(config, build_path(config).start, clock.now_ns())
     assert emulator is not None, "lock-step is refused by AppConfig without an emulated base"
-    simulation = build_simulation(config, config_path, emulator, clock.now_ns())
-    camera = open_simulated_camera(
-        config, config_path, clock, lambda _stamp_ns: simulation.body_pose, clock.now_ns()
-    )
+    simulation = build_simulation(config, emulator, clock.now_ns())
+    camera = open_simulated_camera(config, clock, lambda _stamp_ns: simulation.body_pose, clock.now_ns())
     with simulation, chassis, camera:
-        loop = build_control(config, config_path, chassis)
+        loop = build_control(config, chassis)
         perceiver = build_perceiver(config, loop.localiser, loop.localiser.body_pose, stopwatches.elapsed_ns)
         frames = 0
         started_ns, started_cpu_ns = stopwatches.elapsed_ns(), stopwatches.processor_ns()

@@ -52,7 +52,7 @@ def drive_camera(stage: Stage, config: AppConfig, policy: str, keep: FilePath | 
     with temporary as folder:
         scenario = FilePath(folder) / "scenario.yaml"
         scenario.write_text(as_yaml(stage.case.scenario), encoding="utf-8")
-        return _drive(stage, _mission_config(config, stage, scenario), scenario, policy, keep)
+        return _drive(stage, _mission_config(config, stage, scenario), policy, keep)
 
 
 def _mission_config(config: AppConfig, stage: Stage, scenario: FilePath) -> AppConfig:
@@ -70,18 +70,14 @@ def _mission_config(config: AppConfig, stage: Stage, scenario: FilePath) -> AppC
     return with_slip_and_vibration(mission, stage.case.faults)
 
 
-def _drive(
-    stage: Stage, config: AppConfig, scenario: FilePath, policy: str, keep: FilePath | None
-) -> DriveLog:
+def _drive(stage: Stage, config: AppConfig, policy: str, keep: FilePath | None) -> DriveLog:
     assert isinstance(config.runner, LockstepRunner)
     clock = SimulatedClock()
-    path = build_path(config, scenario)
+    path = build_path(config)
     chassis, emulator = build_base(config, path.start, clock.now_ns())
     assert emulator is not None, "lock-step is refused by AppConfig without an emulated base"
-    simulation = build_simulation(config, scenario, emulator, clock.now_ns())
-    camera = open_faulty_camera(
-        config, scenario, clock, lambda _stamp_ns: simulation.body_pose, clock.now_ns()
-    )
+    simulation = build_simulation(config, emulator, clock.now_ns())
+    camera = open_faulty_camera(config, clock, lambda _stamp_ns: simulation.body_pose, clock.now_ns())
     loop = build_control_loop(config, path, build_policy(policy, config, stage), chassis)
     options = _NO_RECORDING if keep is None else prepare_recording(keep, stage)
     log = DriveLog(SetpointTally(config.robot.limits, 1.0 / config.runner.control_rate_hz))

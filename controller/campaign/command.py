@@ -61,7 +61,7 @@ def run_campaign(options: CampaignOptions) -> int:
     UserError."""
     config = load_app(options.config_path)
     _check(options, config)
-    own = load_own(options.scenarios, config, options.config_path)
+    own = load_own(options.scenarios, config)
     if options.only is not None:
         return _run_one(options, config, _parse_mission(options.only, own, options, config))
     assert options.report is not None
@@ -162,7 +162,7 @@ def _parse_mission(
         )
     if not is_file:
         return Mission(family, int(seed)), None
-    one = own.get(family) or next(iter(load_own((family,), config, options.config_path).values()))
+    one = own.get(family) or next(iter(load_own((family,), config).values()))
     return Mission(label_of(family), int(seed)), one.scenario
 
 

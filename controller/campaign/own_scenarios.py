@@ -32,7 +32,7 @@ def label_of(given: str) -> str:
     return name if name.endswith((".yaml", ".yml")) else f"{name}.yaml"
 
 
-def load_own(given: Sequence[str], config: AppConfig, config_path: Path) -> dict[str, OwnScenario]:
+def load_own(given: Sequence[str], config: AppConfig) -> dict[str, OwnScenario]:
     """The scenarios by their labels, in this order. Tells what is doubtful about their paths.
 
     Raises ConfigError, PathError, UserError.
@@ -47,9 +47,9 @@ def load_own(given: Sequence[str], config: AppConfig, config_path: Path) -> dict
             )
         own[label] = OwnScenario(one, load_scenario(one))
         in_it = _in_this_world(config, one)
-        require_possible_world(in_it, config_path)
+        require_possible_world(in_it)
         for told in (short_arc_warning, close_by_warning):
-            warning = told(in_it, config_path)
+            warning = told(in_it)
             if warning is not None:
                 say(f"treadwatch: warning: {warning}", to_stderr=True)
     return own

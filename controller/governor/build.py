@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path as FilePath
 
 from config.app import AppConfig
 from config.governor import GovernorConfig
@@ -29,11 +28,9 @@ def build_governor(config: AppConfig) -> SpeedGovernor:
     )
 
 
-def build_governor_loop(
-    config: AppConfig, config_path: FilePath, chassis: Chassis, commands: Commands
-) -> GovernorLoop:
+def build_governor_loop(config: AppConfig, chassis: Chassis, commands: Commands) -> GovernorLoop:
     """A governor's control loop. chassis: opened elsewhere. Raises ConfigError, PathError."""
-    start = build_path(config, config_path).start
+    start = build_path(config).start
     response = ResponseMonitor(config.decision.chassis_delay_s, config.robot.limits.max_speed_mps)
     localiser = Localiser(start, mount_of(config.robot))
     return GovernorLoop(build_governor(config), commands, localiser, chassis, response)

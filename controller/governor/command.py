@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path as FilePath
 
 from config.app import AppConfig, RealtimeRunner, load_app
 from config.governor import GovernorConfig, InputConfig, UdpInputConfig
-from config.loader import resolve
 from controller.build import open_commands
 from controller.control import ControlStep
 from controller.drive_lifecycle import Outcome
@@ -46,13 +44,13 @@ def run_governor(options: MissionOptions) -> int:
     Raises ConfigError, HalError, UserError.
     """
     config = with_overrides(load_app(options.config_path), options)
-    config = with_scenario_faults(config, options.config_path)
+    config = with_scenario_faults(config)
     if config.governor is None:
         raise UserError(f"{options.config_path}: has no 'governor' section; add one (docs/governor.md)")
     assert isinstance(config.runner, RealtimeRunner), "a governor in lock-step is refused by AppConfig"
     console = Console(options.quiet, aside=options.observations == STANDARD_OUTPUT)
-    require_possible_world(config, options.config_path)
-    warning = unused_faults_warning(config, options.config_path)
+    require_possible_world(config)
+    warning = unused_faults_warning(config)
     if warning is not None:
         console.warning(warning)
     governing = _govern(config, config.governor, config.runner, options, console)
@@ -69,10 +67,10 @@ def _govern(
 ) -> Governing:
     with (
         realtime_rig(config, runner, options) as rig,
-        open_commands(governor.input, options.config_path) as link,
+        open_commands(config) as link,
     ):
         inbox = build_inbox(link, governor, console.event)
-        loop = build_governor_loop(config, options.config_path, rig.chassis, inbox)
+        loop = build_governor_loop(config, rig.chassis, inbox)
         setpoints = SetpointTally(config.robot.limits, 1.0 / runner.control_rate_hz)
         governing = Governing(
             loop=loop,
@@ -84,7 +82,7 @@ def _govern(
         )
 
         def ready(service: ServiceManager) -> None:
-            console.event(f"ready: commands are heard on {_where(governor.input, options.config_path)}")
+            console.event(f"ready: commands are heard on {_where(config, governor.input)}")
             service.ready("governing")
 
         with rig.under_way(loop, console, ready) as moments:
@@ -96,10 +94,10 @@ def _govern(
     return governing
 
 
-def _where(config: InputConfig, config_path: FilePath) -> str:
-    if isinstance(config, UdpInputConfig):
-        return f"udp {config.host}:{config.port}"
-    return str(resolve(config.path, config_path))
+def _where(config: AppConfig, given: InputConfig) -> str:
+    if isinstance(given, UdpInputConfig):
+        return f"udp {given.host}:{given.port}"
+    return str(config.resolve(given.path))
 
 
 def _report(console: Console, governing: Governing, step: ControlStep) -> None:

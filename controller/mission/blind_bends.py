@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path as FilePath
 
 import numpy as np
 
@@ -85,7 +84,7 @@ def view_of(config: AppConfig) -> CameraView | None:
     return CameraView(tangents[0] / level, tangents[1] / level, range_m)
 
 
-def blind_bend_warning(config: AppConfig, config_path: FilePath) -> str | None:
+def blind_bend_warning(config: AppConfig) -> str | None:
     """A warning about the first bend of the path that the camera cannot see round: where, why and what to do.
 
     One line. None if there is no such bend, or if the angle of view is not known. Raises ConfigError,
@@ -94,8 +93,8 @@ def blind_bend_warning(config: AppConfig, config_path: FilePath) -> str | None:
     view = view_of(config)
     if view is None:
         return None
-    where, spec = path_spec(config, config_path)
-    path = build_path(config, config_path)
+    where, spec = path_spec(config)
+    path = build_path(config)
     check = BendCheck(config.robot, mount_of(config.robot), view, config.decision)
     bend = check.first_blind_bend(spec, path)
     if bend is None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path as FilePath
-
 import numpy as np
 
 from config.app import AppConfig
@@ -20,7 +18,7 @@ _MOST_POSES = 3000
 _MOST_TOLD = 3
 
 
-def close_by_warning(config: AppConfig, config_path: FilePath) -> str | None:
+def close_by_warning(config: AppConfig) -> str | None:
     """One line about what stands on the path, beside it or behind its target; None if there is room.
 
     Movers are left out: where they will be depends on the time. So are scenarios whose outcome is "blocked".
@@ -28,12 +26,12 @@ def close_by_warning(config: AppConfig, config_path: FilePath) -> str | None:
     """
     if config.simulation is None or config.governor is not None:
         return None
-    scenario = scenario_of(config.simulation, config_path)
+    scenario = scenario_of(config)
     if scenario.outcome == "blocked":
         return None
-    where, _ = path_spec(config, config_path)
-    path = build_path(config, config_path)
-    world = build_still_world(config, config_path)
+    where, _ = path_spec(config)
+    path = build_path(config)
+    world = build_still_world(config)
     warnings = _beside(config, path, world) | _behind_target(config, path, world)
     if not warnings:
         return None

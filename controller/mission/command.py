@@ -42,15 +42,15 @@ def run_mission(options: MissionOptions) -> int:
     Raises ConfigError, HalError, UserError.
     """
     config = with_overrides(load_app(options.config_path), options)
-    config = with_scenario_faults(config, options.config_path)
+    config = with_scenario_faults(config)
     if config.governor is not None:
         raise UserError(
             f"{options.config_path}: has a 'governor' and no path to drive; use `treadwatch govern`"
         )
     console = Console(options.quiet, aside=options.observations == STANDARD_OUTPUT)
-    require_possible_world(config, options.config_path)
+    require_possible_world(config)
     for warning_of in (short_arc_warning, close_by_warning, blind_bend_warning, unused_faults_warning):
-        warning = warning_of(config, options.config_path)
+        warning = warning_of(config)
         if warning is not None:
             console.warning(warning)
     if isinstance(config.runner, LockstepRunner):
@@ -87,13 +87,11 @@ def drive_lockstep(
 ) -> MissionResult:
     """Drive in one thread, in simulated time."""
     clock = SimulatedClock()
-    path = build_path(config, options.config_path)
+    path = build_path(config)
     chassis, emulator = build_base(config, path.start, clock.now_ns())
     assert emulator is not None, "lock-step is refused by AppConfig without an emulated base"
-    simulation = build_simulation(config, options.config_path, emulator, clock.now_ns())
-    camera = open_faulty_camera(
-        config, options.config_path, clock, lambda _stamp_ns: simulation.body_pose, clock.now_ns()
-    )
+    simulation = build_simulation(config, emulator, clock.now_ns())
+    camera = open_faulty_camera(config, clock, lambda _stamp_ns: simulation.body_pose, clock.now_ns())
     # Recordings must be repeatable, so durations that were measured on this machine are left out of them.
     recording = RecordingOptions(options.observations, options.video, options.record, timed=False)
     with ExitStack() as devices:
@@ -103,13 +101,13 @@ def drive_lockstep(
         recorder = devices.enter_context(open_recorder(recording, surroundings(config)))
         stop = StopRequest().listen()
         devices.callback(stop.closing)
-        loop = build_control(config, options.config_path, chassis)
+        loop = build_control(config, chassis)
         setpoints = SetpointTally(config.robot.limits, 1.0 / runner.control_rate_hz)
         result = MissionResult(loop=loop, setpoints=setpoints, simulation=simulation)
         perceiver = build_perceiver(config, loop.localiser, loop.localiser.body_pose, time.perf_counter_ns)
         run_recorder = RunRecorder(recorder, path)
         began_s = time.perf_counter()
-        late_by = build_faults(config, options.config_path).late_by
+        late_by = build_faults(config).late_by
         for moment in run_lockstep(runner, clock, simulation, camera, perceiver, loop, late_by):
             step = moment.control
             result.take(step)

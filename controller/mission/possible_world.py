@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path as FilePath
-
 import numpy as np
 
 from config.app import AppConfig
@@ -16,16 +14,16 @@ from sim.contact import BUILDING, nearest_body
 _LOOKED_AT_EVERY_M = 0.1
 
 
-def require_possible_world(config: AppConfig, config_path: FilePath) -> None:
+def require_possible_world(config: AppConfig) -> None:
     """The robot must be free where it starts, and its path must stay in the room.
 
     Raises ConfigError, PathError. A governed robot drives no path, so only its start is checked.
     """
     if config.simulation is None:
         return
-    where, _ = path_spec(config, config_path)
-    path = build_path(config, config_path)
-    world = build_world(config, config_path)
+    where, _ = path_spec(config)
+    path = build_path(config)
+    world = build_world(config)
     start = f"{where}: path.start: at x {path.start.x_m:g}, y {path.start.y_m:g}"
     room = world.scenario.room
     if not _is_in(room, path.start.x_m, path.start.y_m):

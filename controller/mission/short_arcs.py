@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from config.app import AppConfig
 from config.path import ArcSpec
 from controller.build import path_spec
 
 
-def short_arc_warning(config: AppConfig, config_path: Path) -> str | None:
+def short_arc_warning(config: AppConfig) -> str | None:
     """One line about every arc of the path that hardly turns; None if there is none. Raises ConfigError."""
     if config.path is None and config.simulation is None:
         return None
-    where, spec = path_spec(config, config_path)
+    where, spec = path_spec(config)
     warnings = [
         f"path.segments.{number}: the arc is only {segment.length_m - segment.blend_m:.2f} m long; "
         f"{segment.in_degrees}"

@@ -20,7 +20,7 @@ def drive_realtime(
 ) -> MissionResult:
     """Drive the mission. Raises ConfigError, HalError or UserError only if nothing has moved."""
     with realtime_rig(config, runner, options) as rig:
-        loop = build_control(config, options.config_path, rig.chassis)
+        loop = build_control(config, rig.chassis)
         result = MissionResult(
             loop=loop,
             setpoints=SetpointTally(config.robot.limits, 1.0 / runner.control_rate_hz),

@@ -9,7 +9,6 @@ import socket
 import time
 from contextlib import suppress
 from functools import partial
-from pathlib import Path as FilePath
 
 from config.app import AppConfig, RealtimeRunner
 from controller.build import build_path, build_perceiver, open_camera, surroundings
@@ -118,7 +117,7 @@ class RemoteBody:
 
 
 def perceive_forever(
-    config: AppConfig, config_path: FilePath, end: socket.socket, start_ns: int, recording: RecordingOptions
+    config: AppConfig, end: socket.socket, start_ns: int, recording: RecordingOptions
 ) -> None:
     """Entry point of the process. Returns when the camera ends or the control process is gone.
 
@@ -127,7 +126,7 @@ def perceive_forever(
     """
     channel = Channel(end)
     try:
-        _look_until_the_end(config, config_path, channel, start_ns, recording)
+        _look_until_the_end(config, channel, start_ns, recording)
     except PeerGone:
         return
     except EndOfStream:
@@ -144,14 +143,14 @@ def perceive_forever(
 
 
 def _look_until_the_end(
-    config: AppConfig, config_path: FilePath, channel: Channel, start_ns: int, recording: RecordingOptions
+    config: AppConfig, channel: Channel, start_ns: int, recording: RecordingOptions
 ) -> None:
     assert isinstance(config.runner, RealtimeRunner)
     timeout_s = config.runner.frame_timeout_s
-    path = build_path(config, config_path)
+    path = build_path(config)
     body = RemoteBody(channel, mount_of(config.robot), path.start)
     with (
-        open_camera(config, config_path, MonotonicClock(), body.true_pose, start_ns) as camera,
+        open_camera(config, MonotonicClock(), body.true_pose, start_ns) as camera,
         open_recorder(recording, surroundings(config), partial(_say_cut_off, channel)) as recorder,
     ):
         perceiver = build_perceiver(config, body, body.body_pose, time.perf_counter_ns)

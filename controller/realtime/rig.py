@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from multiprocessing.process import BaseProcess
-from pathlib import Path
 from typing import Protocol
 
 from config.app import AppConfig, RealtimeRunner
@@ -77,7 +76,7 @@ class RealtimeRig:
         stop = StopRequest().listen()
         recording = _recording(self.options)
         with (
-            perception_beside(self.config, self.options.config_path, self.start_ns, recording) as link,
+            perception_beside(self.config, self.start_ns, recording) as link,
             console.beside_a_drive(),
         ):
             # After all else, so that processes and threads started before keep ordinary scheduling.
@@ -139,15 +138,15 @@ def _why_over(lifecycle: DriveLifecycle) -> str:
 @contextmanager
 def realtime_rig(config: AppConfig, runner: RealtimeRunner, options: MissionOptions) -> Iterator[RealtimeRig]:
     """Open the base, and the simulated world if there is one. Raises ConfigError, HalError, UserError."""
-    require_camera(config, options.config_path)
+    require_camera(config)
     require_writable(_recording(options))
     clock = MonotonicClock()
     start_ns = clock.now_ns() + round(HEAD_START_S * NS_PER_S)
-    start = build_path(config, options.config_path).start
+    start = build_path(config).start
     chassis, emulator = build_base(config, start, clock.now_ns())
     simulation = None
     if emulator is not None:
-        simulation = build_simulation(config, options.config_path, emulator, start_ns)
+        simulation = build_simulation(config, emulator, start_ns)
     with ExitStack() as devices:
         if simulation is not None:
             devices.enter_context(simulation)
@@ -162,7 +161,7 @@ def _recording(options: MissionOptions) -> RecordingOptions:
 
 @contextmanager
 def perception_beside(
-    config: AppConfig, config_path: Path, start_ns: int, recording: RecordingOptions
+    config: AppConfig, start_ns: int, recording: RecordingOptions
 ) -> Iterator[PerceptionLink]:
     """Run the perception process during the block.
 
@@ -172,7 +171,7 @@ def perception_beside(
     here, there = channel_sockets()
     process: BaseProcess = multiprocessing.get_context("spawn").Process(
         target=perceive_forever,
-        args=(config, config_path, there, start_ns, recording),
+        args=(config, there, start_ns, recording),
         name="perception",
         daemon=True,
     )

@@ -60,7 +60,7 @@ def run_watch(options: WatchOptions) -> int:
     """
     given = options.mission
     config = with_overrides(load_app(given.config_path), given)
-    config = with_scenario_faults(config, given.config_path)
+    config = with_scenario_faults(config)
     if isinstance(config.runner, LockstepRunner):
         raise UserError(
             f"{given.config_path}: runner.kind 'lockstep' is simulated time, and watching happens in real "
@@ -68,7 +68,7 @@ def run_watch(options: WatchOptions) -> int:
         )
     console = Console(given.quiet, aside=given.observations == STANDARD_OUTPUT)
     recording = RecordingOptions(given.observations, given.video, given.record)
-    require_camera(config, given.config_path)
+    require_camera(config)
     require_writable(recording)
     result = WatchResult(mount=mount_of(config.robot))
     loop = _watch(config, config.runner, options, recording, console, result)
@@ -84,7 +84,7 @@ def _watch(
     console: Console,
     result: WatchResult,
 ) -> WatchLoop:
-    config_path, clock = options.mission.config_path, MonotonicClock()
+    clock = MonotonicClock()
     start_ns = clock.now_ns() + round(HEAD_START_S * NS_PER_S)
     with ExitStack() as devices:
         chassis, simulation = _open_base(config, options, devices, start_ns)
@@ -94,7 +94,7 @@ def _watch(
         # How long to watch is for the loop to say, not for the configuration of a drive.
         endless = runner.model_copy(update={"max_duration_s": None})
         with (
-            perception_beside(config, config_path, start_ns, recording) as link,
+            perception_beside(config, start_ns, recording) as link,
             console.beside_a_drive(),
         ):
             moments = run_realtime(endless, clock, simulation, link, loop, service, stop, Punctuality())
@@ -131,12 +131,11 @@ def _open_base(
     """The base, and the simulated world if there is one. start_ns: its time zero. Raises HalError."""
     if options.no_chassis:
         return NoBase(), None
-    config_path = options.mission.config_path
-    start = build_path(config, config_path).start
+    start = build_path(config).start
     chassis, emulator = build_listener(config, start, MonotonicClock().now_ns())
     simulation = None
     if emulator is not None:
-        simulation = devices.enter_context(build_simulation(config, config_path, emulator, start_ns))
+        simulation = devices.enter_context(build_simulation(config, emulator, start_ns))
     try:
         return devices.enter_context(chassis), simulation
     except HalError as error:

@@ -28,8 +28,8 @@ def test_the_example_can_be_driven(tmp_path: Path) -> None:
     assert app.simulation is not None
     simulation = app.simulation.model_copy(update={"scenario": str(file)})
     app = app.model_copy(update={"simulation": simulation})
-    require_possible_world(app, CONFIG_DIR / "sim.yaml")
-    assert close_by_warning(app, CONFIG_DIR / "sim.yaml") is None
+    require_possible_world(app)
+    assert close_by_warning(app) is None
 
 
 @pytest.mark.parametrize("key", Faults.model_fields)

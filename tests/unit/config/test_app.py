@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import pickle
 from itertools import count
 from pathlib import Path
 
 import pytest
 import yaml
 
-from config.app import load_app, load_replay
+from config.app import AppConfig, load_app, load_replay
 from config.loader import CONFIG_DIR, ConfigError
 from hal.chassis.command import due
 from hal.clocks import NS_PER_MS, NS_PER_S
@@ -259,3 +260,24 @@ def test_the_lock_step_loop_has_its_base_in_the_program(tmp_path: Path) -> None:
     load_app(written(tmp_path, config))
     with pytest.raises(ConfigError, match=r"lockstep.* needs simulation\.base 'emulated'"):
         load_app(written(tmp_path, config | {"runner": {"kind": "lockstep"}}))
+
+
+def test_copies_and_other_processes_know_beside_which_yaml_its_files_are(tmp_path: Path) -> None:
+    file = written(tmp_path, SIM)
+    config = load_app(file)
+    changed = config.model_copy(update={"robot": config.robot})
+    for one in (config, changed, pickle.loads(pickle.dumps(changed))):
+        assert one.file == file
+        assert one.resolve("hall.yaml") == tmp_path / "hall.yaml"
+
+
+def test_where_a_configuration_was_read_from_is_no_part_of_what_it_says(tmp_path: Path) -> None:
+    """A campaign is resumed from another folder."""
+    (tmp_path / "moved").mkdir()
+    here, there = (load_app(written(folder, SIM)) for folder in (tmp_path, tmp_path / "moved"))
+    assert here.model_dump_json() == there.model_dump_json()
+
+
+def test_without_a_file_names_are_relative_to_the_working_directory() -> None:
+    config = AppConfig.model_validate(SIM)
+    assert (str(config.file), config.resolve("hall.yaml")) == ("configuration", Path("hall.yaml"))

@@ -29,7 +29,7 @@ def recorded_camera(
     app["camera"] = {"kind": "replay", "folder": str(recording.relative_to(folder)), **keys}
     file = folder / "robot.yaml"
     file.write_text(yaml.safe_dump(app))
-    return open_camera(load_app(file), file, clock, lambda _: None, 0)
+    return open_camera(load_app(file), clock, lambda _: None, 0)
 
 
 @pytest.mark.parametrize("record", [write_recording, small_bag])

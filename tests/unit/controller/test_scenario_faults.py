@@ -39,12 +39,12 @@ def app(**simulation: object) -> AppConfig:
             "camera": config.camera.model_copy(update=small),
         }
     )
-    return with_scenario_faults(config, CONFIG_FILE)
+    return with_scenario_faults(config)
 
 
 def test_frames_are_lost_frozen_and_without_depth_on_glass() -> None:
     clock = SimulatedClock(START_NS)
-    camera = open_faulty_camera(app(), CONFIG_FILE, clock, lambda _: None, START_NS)
+    camera = open_faulty_camera(app(), clock, lambda _: None, START_NS)
     with camera:
         frames = [camera.read(2.0) for _ in range(24)]
     times = [round((frame.captured_ns - START_NS) / NS_PER_S, 1) for frame in frames]
@@ -59,7 +59,7 @@ def test_frames_are_lost_frozen_and_without_depth_on_glass() -> None:
 
 def test_late_frames_arrive_late_and_in_order_in_real_time() -> None:
     clock = SimulatedClock(START_NS)
-    with open_camera(app(), CONFIG_FILE, clock, lambda _: None, START_NS) as camera:
+    with open_camera(app(), clock, lambda _: None, START_NS) as camera:
         arrivals = []
         while clock.now_ns() < START_NS + 6.5 * NS_PER_S:
             try:
@@ -98,7 +98,7 @@ def test_a_base_that_loses_its_feedback_answers_no_more() -> None:
     config = app()
     chassis, emulator = build_base(config, PlanarPose(0.0, 0.0, 0.0), 0)
     assert emulator is not None
-    simulation = build_simulation(config, CONFIG_FILE, emulator, 0)
+    simulation = build_simulation(config, emulator, 0)
     frozen = []
     emulator.freeze = lambda: frozen.append(True)  # type: ignore[method-assign]
     with simulation, chassis:
@@ -120,11 +120,11 @@ def test_a_drive_meets_the_faults_of_its_scenario(tmp_path: Path) -> None:
     assert not [stamp for stamp in stamps if 1.0 <= stamp < 1.5]
     assert result.last is not None
     assert math.isnan(result.last.chassis.v_mps) or result.last.chassis.mode.value == "lost"
-    assert build_faults(config, CONFIG_FILE).feedback_lost_s == 5.0
+    assert build_faults(config).feedback_lost_s == 5.0
 
 
 def test_an_external_base_has_none_of_the_faults_of_a_base() -> None:
-    assert unused_faults_warning(app(), CONFIG_FILE) is None
-    told = unused_faults_warning(app(base="external"), CONFIG_FILE)
+    assert unused_faults_warning(app()) is None
+    told = unused_faults_warning(app(base="external"))
     assert told is not None
     assert "faults.yaw_slip, faults.distance_slip, faults.feedback_lost_s: not simulated" in told

@@ -106,11 +106,11 @@ def test_a_base_that_does_not_obey_ends_the_measurement() -> None:
 
 def test_control_steps_leave_out_the_exchange() -> None:
     config = load_app(MISSION)
-    chassis, emulator = build_base(config, build_path(config, MISSION).start, 0)
+    chassis, emulator = build_base(config, build_path(config).start, 0)
     assert emulator is not None
     stopwatch_ns = every(1000)
     timed = TimedChassis(chassis, stopwatch_ns)
-    loop = build_control(config, MISSION, timed)
+    loop = build_control(config, timed)
     ticks = Ticks()
     figures = measure_control(loop, timed, emulator, 10, stopwatch_ns, ticks)
     # Four readings: around the step and, inside it, around the exchange: 3 us less 1 us.

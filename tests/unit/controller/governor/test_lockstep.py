@@ -49,18 +49,18 @@ def governed(folder: Path, crate_x_m: float, crate_y_m: float) -> AppConfig:
 
 def test_a_crate_on_the_arc_stops_it_in_time(tmp_path: Path) -> None:
     # On the arc of 10 m radius, 0.4 rad along: beside a straight way.
-    config, where = governed(tmp_path, 3.9, 0.79), tmp_path / "governor.yaml"
+    config = governed(tmp_path, 3.9, 0.79)
     clock = SimulatedClock()
-    chassis, emulator = build_base(config, build_path(config, where).start, 0)
+    chassis, emulator = build_base(config, build_path(config).start, 0)
     assert emulator is not None
-    simulation = build_simulation(config, where, emulator, 0)
-    camera = open_simulated_camera(config, where, clock, lambda _: simulation.body_pose, 0)
+    simulation = build_simulation(config, emulator, 0)
+    camera = open_simulated_camera(config, clock, lambda _: simulation.body_pose, 0)
     tally = SetpointTally(config.robot.limits, 0.02)
     steps: list[ControlStep] = []
     with ExitStack() as devices:
         for device in (simulation, chassis, camera):
             devices.enter_context(device)
-        loop = build_governor_loop(config, where, chassis, LeftBend())
+        loop = build_governor_loop(config, chassis, LeftBend())
         perceiver = build_perceiver(config, loop.localiser, loop.localiser.body_pose, lambda: 0)
         runner = LockstepRunner(kind="lockstep", max_duration_s=9.0)
         for moment in run_lockstep(runner, clock, simulation, camera, perceiver, loop):

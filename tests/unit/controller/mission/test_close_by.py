@@ -19,7 +19,7 @@ def warning(scenario: str) -> str | None:
     app = load_app(SIM)
     assert app.simulation is not None
     changed = app.simulation.model_copy(update={"scenario": scenario})
-    return close_by_warning(app.model_copy(update={"simulation": changed}), SIM)
+    return close_by_warning(app.model_copy(update={"simulation": changed}))
 
 
 def scenario(folder: Path, *bodies: str, outcome: str = "target") -> str:

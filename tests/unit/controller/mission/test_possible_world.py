@@ -29,7 +29,7 @@ def require(scenario: str, config: str = "sim.yaml") -> None:
     app = load_app(CONFIG_DIR / config)
     assert app.simulation is not None
     simulation = app.simulation.model_copy(update={"scenario": scenario})
-    require_possible_world(app.model_copy(update={"simulation": simulation}), CONFIG_DIR / config)
+    require_possible_world(app.model_copy(update={"simulation": simulation}))
 
 
 def written(folder: Path, x: float = 0.0, length: float = 6.0) -> str:

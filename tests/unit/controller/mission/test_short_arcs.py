@@ -21,7 +21,7 @@ def warning(scenario: str) -> str | None:
     app = load_app(SIM)
     assert app.simulation is not None
     changed = app.simulation.model_copy(update={"scenario": scenario})
-    return short_arc_warning(app.model_copy(update={"simulation": changed}), SIM)
+    return short_arc_warning(app.model_copy(update={"simulation": changed}))
 
 
 def scenario(folder: Path, radius_m: float, angle_deg: float) -> str:

@@ -149,7 +149,7 @@ def test_a_recording_that_cannot_be_written_is_told_to_the_control_process(tmp_p
     here, there = channel_sockets()
     with here, there:
         recording = RecordingOptions(observations=tmp_path / "none" / "out.jsonl")
-        perceive_forever(load_app(config_path), config_path, there, 0, recording)
+        perceive_forever(load_app(config_path), there, 0, recording)
         told = Channel(here).receive()
     assert isinstance(told, Farewell)
     assert "observations cannot be written there" in told.reason
@@ -165,6 +165,6 @@ def test_unforeseen_error_is_told_to_the_control_process_and_raised(monkeypatch:
     with here, there:
         Channel(here).send(step_at(0, 0.0, 0.0, PlanarPose(0.0, 0.0, 0.0)))
         with pytest.raises(cv2.error):
-            perceive_forever(load_app(config_path), config_path, there, 0, RecordingOptions())
+            perceive_forever(load_app(config_path), there, 0, RecordingOptions())
         told = Channel(here).receive()
     assert told == Farewell("perception failed: error: OpenCV(4.12.0) imgproc: (-215) !empty()")

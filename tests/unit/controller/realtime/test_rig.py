@@ -37,7 +37,7 @@ def rig_of(chassis: ObedientChassis) -> tuple[RealtimeRig, ControlLoop]:
     rig = RealtimeRig(
         config, config.runner, MissionOptions(Path(path)), clock, 0, punctual, None, Punctuality()
     )
-    return rig, build_control(config, path, punctual)
+    return rig, build_control(config, punctual)
 
 
 def test_an_error_of_the_drive_stops_the_base_before_perception_is_waited_for(
@@ -154,7 +154,7 @@ def sleeps_for_ever(*_: object) -> None:
     time.sleep(600.0)
 
 
-def tells_late(_config: object, _path: object, end: socket.socket, *_: object) -> None:
+def tells_late(_config: object, end: socket.socket, *_: object) -> None:
     """In place of a perception process that cannot finish a file after the drive."""
     channel = Channel(end)
     channel.send(CutOff("it runs"))
@@ -173,7 +173,7 @@ def test_files_that_a_killed_perception_may_not_have_closed_are_named(
     monkeypatch.setattr(realtime_rig, "GOODBYE_S", 0.1)
     path = CONFIG_DIR / "sim-realtime.yaml"
     recording = RecordingOptions(video=Path("drive.mp4") if recorded else None)
-    with perception_beside(load_app(path), Path(path), 0, recording) as link:
+    with perception_beside(load_app(path), 0, recording) as link:
         pass
     why = ["drive.mp4: may not be whole: they were not closed within 0.1 s; is the disk too slow?"]
     assert link.cut_off == (why if recorded else [])
@@ -182,7 +182,7 @@ def test_files_that_a_killed_perception_may_not_have_closed_are_named(
 def test_message_of_perception_after_the_drive_is_received(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(realtime_rig, "perceive_forever", tells_late)
     path = CONFIG_DIR / "sim-realtime.yaml"
-    with perception_beside(load_app(path), Path(path), 0, RecordingOptions()) as link:
+    with perception_beside(load_app(path), 0, RecordingOptions()) as link:
         began_s = time.monotonic()
         while not link.cut_off and time.monotonic() - began_s < 60.0:
             link.receive()

@@ -27,7 +27,7 @@ class WarmChassis(ObedientChassis):
 def drive(seconds: float, sees: bool, chassis: ObedientChassis | None = None) -> MissionResult:
     """The first seconds of the simulated mission, with a free way in sight or nothing at all."""
     config = load_app(CONFIG_PATH)
-    loop = build_control(config, CONFIG_PATH, chassis or ObedientChassis())
+    loop = build_control(config, chassis or ObedientChassis())
     result = MissionResult(loop=loop, setpoints=SetpointTally(config.robot.limits, PERIOD_S))
     console = Console(quiet=False)
     for index in range(round(seconds / PERIOD_S)):
