@@ -6,6 +6,6 @@
 * envelope.py - `treadwatch envelope`: what the robot can guarantee
 * emulate.py - `treadwatch emulate`: an emulated base in a process of its own
 
-Commands that need more than one file have a package: mission/, watch/, governor/, bench/, evaluation/,
-campaign/, faults/; `treadwatch replay` is controller/replay.py.
+Commands that need more than one file have a package: mission/, watch/, governor/, replay/, bench/,
+evaluation/, campaign/, faults/.
 """

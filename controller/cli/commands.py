@@ -113,7 +113,7 @@ def replay(
     does not give the camera's mounting, that of the robot's FILE is used; without FILE, the floor is found in
     the depth.
     """
-    from controller.replay import ReplayOptions, run_replay
+    from controller.replay.command import ReplayOptions, run_replay
     from hal.cameras.bag_topics import WantedTopics
 
     topics = WantedTopics(colour_topic, depth_topic, odometry_topic)

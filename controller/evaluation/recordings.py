@@ -18,7 +18,6 @@ import numpy as np
 from config.app import ReplayConfig
 from config.camera import OdometryChoice
 from controller.build import open_replay
-from controller.build_replay import build_replay_perceiver
 from controller.errors import UserError
 from controller.evaluation.methods.ours import detection_of
 from controller.evaluation.run_sequence import Snapshot
@@ -26,6 +25,7 @@ from controller.evaluation.scores.scoring import WRONG_FRAMES, FrameScore
 from controller.evaluation.scores.totals import ratio
 from controller.evaluation.types import FrameTruth
 from controller.perceive import Look
+from controller.replay.build import build_replay_perceiver
 from hal.clocks import NS_PER_S
 from hal.errors import EndOfStream
 from vision.scene import CameraCondition

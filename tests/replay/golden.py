@@ -17,7 +17,7 @@ from config.app import LockstepRunner, load_app
 from config.loader import CONFIG_DIR
 from controller.mission.command import drive_lockstep, with_overrides
 from controller.mission.result import MissionOptions
-from controller.replay import ReplayOptions, run_replay
+from controller.replay.command import ReplayOptions, run_replay
 from controller.terminal.console import Console
 from tests.support.recordings import DESK_RPY
 

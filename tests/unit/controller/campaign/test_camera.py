@@ -12,7 +12,7 @@ from config.loader import CONFIG_DIR
 from config.scenario import load_scenario
 from controller.campaign.camera_mission import drive_camera, prepare_recording
 from controller.errors import UserError
-from controller.replay import ReplayOptions, run_replay
+from controller.replay.command import ReplayOptions, run_replay
 from tests.support.campaign import CONFIG, crate, mover, silent, stage
 
 

@@ -11,9 +11,9 @@ from config.app import ReplayConfig
 from config.decision import DecisionConfig
 from config.perception import DepthNoise, PerceptionConfig
 from config.robot import Robot
-from controller.build_replay import build_replay_decision
 from controller.decision.world_model import WorldModel
 from controller.path.path import OnPath
+from controller.replay.build import build_replay_decision
 from hal.types import PlanarPose
 from tests.support.decision_bench import MOUNT, PATH, Bench, obstacle
 from tests.support.scenes import free_space

@@ -17,7 +17,7 @@ from config.loader import CONFIG_DIR
 from controller.mission.command import run_mission
 from controller.mission.result import MissionOptions
 from controller.record.frame_recorder import FrameRecorder
-from controller.replay import ReplayOptions, run_replay
+from controller.replay.command import ReplayOptions, run_replay
 from hal.cameras.pose_file import open_odometry
 from hal.cameras.tum_replay import TumReplay
 from hal.cameras.tum_writer import TumWriter

@@ -16,7 +16,6 @@ import numpy as np
 from config.app import ReplayConfig, load_replay
 from config.camera import OdometryChoice
 from controller.build import open_replay, straight_ahead
-from controller.build_replay import build_replay_decision, build_replay_perceiver, replay_surroundings
 from controller.decision.decide import DecisionMaker
 from controller.decision.decision import Decision
 from controller.decision.situation import Situation
@@ -27,6 +26,7 @@ from controller.perceive import Look
 from controller.record.observations import STANDARD_OUTPUT
 from controller.record.recorder import RecordingOptions, open_recorder, require_two_files
 from controller.record.tally import ConditionTally, TimingTally
+from controller.replay.build import build_replay_decision, build_replay_perceiver, replay_surroundings
 from controller.terminal.console import Console
 from hal.cameras.bag_topics import WantedTopics
 from hal.clocks import NS_PER_S

@@ -15,7 +15,7 @@ from config.app import load_app, load_replay
 from config.loader import CONFIG_DIR
 from controller.ego_speed import EgoSpeed
 from controller.errors import UserError
-from controller.replay import ReplayOptions, recorded_mount, run_replay
+from controller.replay.command import ReplayOptions, recorded_mount, run_replay
 from hal.cameras.tum_replay import TumReplay
 from hal.cameras.tum_writer import TumWriter
 from hal.types import Pose
@@ -23,7 +23,7 @@ from tests.support.bags import camera_entries, write_bag
 from tests.support.recordings import small_frame
 from vision.scene import EgoMotion
 
-DESK = Path(__file__).resolve().parents[2] / "recordings" / "desk_rpy"
+DESK = Path(__file__).resolve().parents[3] / "recordings" / "desk_rpy"
 
 
 @pytest.mark.parametrize(
