@@ -5,8 +5,7 @@ The files and folders in the order in which they come into play:
 * __main__.py, cli/ - the command `treadwatch`; errors.py - what a user can correct
 * mission/ - `treadwatch run`; governor/ - `treadwatch govern`; watch/ - `treadwatch watch`; replay/ -
   `treadwatch replay`; ego_speed.py - the speed by the images, for the last two
-* build.py, build_chassis.py - make the parts that the YAML asks for; scenario_faults.py - slip and vibration
-  of a scenario; path/ - the planned path
+* build.py, build_chassis.py - make the parts that the YAML asks for; path/ - the planned path
 * lockstep.py, realtime/ - the loops: when a frame is looked at, and when the control steps
 * perceive.py - a frame through vision/
 * control.py - one control step, through all files from here to guard.py

@@ -30,9 +30,9 @@ from controller.campaign.stage import Stage
 from controller.drive_lifecycle import SETTLE_S, Outcome
 from controller.errors import UserError
 from controller.lockstep import run_lockstep
+from controller.mission.scenario_faults import with_slip_and_vibration
 from controller.record.recorder import RecordingOptions, RunRecorder, open_recorder
 from controller.record.tally import SetpointTally
-from controller.scenario_faults import with_slip_and_vibration
 from hal.clocks import NS_PER_S, SimulatedClock
 from hal.types import ChassisMode, PlanarPose
 from sim.plant import PLANT_REST_MPS

@@ -16,11 +16,11 @@ from controller.governor.loop import GovernorLoop
 from controller.mission.command import with_overrides
 from controller.mission.possible_world import require_possible_world
 from controller.mission.result import DriveResult, MissionOptions
+from controller.mission.scenario_faults import unused_faults_warning, with_scenario_faults
 from controller.realtime.rig import realtime_rig
 from controller.realtime.service import ServiceManager
 from controller.record.observations import STANDARD_OUTPUT
 from controller.record.tally import SetpointTally
-from controller.scenario_faults import unused_faults_warning, with_scenario_faults
 from controller.terminal.console import Console
 from controller.terminal.summary import drive_rows
 

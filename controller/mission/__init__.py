@@ -3,6 +3,7 @@
 The files in the order in which they come into play:
 
 * command.py - checks, drives in lock-step or in real time (realtime/mission.py), prints the summary
+* scenario_faults.py - the slip and the vibration that a scenario asks for
 * possible_world.py - refuses a simulated world in which the robot cannot drive
 * short_arcs.py - warns of arcs whose angle was given in radians
 * close_by.py - warns of what stands too near to the path of a simulation

@@ -24,13 +24,13 @@ from controller.mission.blind_bends import blind_bend_warning
 from controller.mission.close_by import close_by_warning
 from controller.mission.possible_world import require_possible_world
 from controller.mission.result import MissionOptions, MissionResult
+from controller.mission.scenario_faults import unused_faults_warning, with_scenario_faults
 from controller.mission.short_arcs import short_arc_warning
 from controller.realtime.mission import drive_realtime
 from controller.realtime.service import StopRequest
 from controller.record.observations import STANDARD_OUTPUT
 from controller.record.recorder import RecordingOptions, RunRecorder, open_recorder
 from controller.record.tally import SetpointTally
-from controller.scenario_faults import unused_faults_warning, with_scenario_faults
 from controller.terminal.console import Console
 from controller.terminal.summary import report, summary_rows
 from hal.clocks import SimulatedClock

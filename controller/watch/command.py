@@ -21,12 +21,12 @@ from controller.errors import UserError
 from controller.localise import Localiser
 from controller.mission.command import with_overrides
 from controller.mission.result import MissionOptions
+from controller.mission.scenario_faults import with_scenario_faults
 from controller.realtime.rig import HEAD_START_S, perception_beside
 from controller.realtime.runner import STREAM_ENDED, PerceptionLink, Punctuality, run_realtime
 from controller.realtime.service import ServiceManager, StopRequest
 from controller.record.observations import STANDARD_OUTPUT
 from controller.record.recorder import RecordingOptions, require_writable
-from controller.scenario_faults import with_scenario_faults
 from controller.terminal.console import Console
 from controller.watch.loop import WatchLoop
 from controller.watch.no_base import NoBase

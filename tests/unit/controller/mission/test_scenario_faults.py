@@ -16,14 +16,14 @@ from controller.build import build_faults, build_simulation, open_camera, open_f
 from controller.build_chassis import build_base
 from controller.mission.command import drive_lockstep
 from controller.mission.result import MissionOptions
-from controller.scenario_faults import unused_faults_warning, with_scenario_faults
+from controller.mission.scenario_faults import unused_faults_warning, with_scenario_faults
 from controller.terminal.console import Console
 from hal.clocks import NS_PER_S, SimulatedClock
 from hal.errors import FrameTimeout
 from hal.types import PlanarPose
 
 CONFIG_FILE = CONFIG_DIR / "sim.yaml"
-EVERY_FAULT = Path(__file__).parents[2] / "scenarios" / "faults.yaml"
+EVERY_FAULT = Path(__file__).parents[3] / "scenarios" / "faults.yaml"
 START_NS = 5 * NS_PER_S  # the world begins later than the clock, as in real time
 
 
