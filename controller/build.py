@@ -25,14 +25,14 @@ from config.governor import UdpInputConfig, UnixInputConfig
 from config.path import LineSpec, PathSpec
 from config.robot import Robot
 from config.scenario import Scenario, load_scenario
+from controller.base.localise import Localiser
+from controller.base.response_monitor import ResponseMonitor
 from controller.control import ControlLoop, Decides
 from controller.decision.decide import DecisionMaker
 from controller.follow import PathFollower
-from controller.localise import Localiser
 from controller.path.path import Path, PathError
 from controller.perceive import Perceiver
 from controller.record.recorder import Surroundings
-from controller.response_monitor import ResponseMonitor
 from controller.shape import SpeedShaper
 from hal.api import Chassis, Clock, DatagramLink, FrameSource, OdometrySource
 from hal.cameras.bag_file import is_bag

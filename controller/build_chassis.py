@@ -17,7 +17,7 @@ from config.chassis import (
     RoboteqChassisConfig,
 )
 from config.plant import PlantConfig
-from controller.guard import GuardedCanLink, GuardedChassis, GuardLimits
+from controller.base.guard import GuardedCanLink, GuardedChassis, GuardLimits
 from hal.api import CanLink, Chassis, ChassisListener, SerialLink
 from hal.chassis.agilex import COMMANDS as AGILEX_COMMANDS
 from hal.chassis.agilex import AgilexChassis

@@ -1,7 +1,7 @@
 """One control step along a path: chassis state and scene in, decision and shaped setpoint out.
 
 All loops step it (controller/lockstep.py, controller/realtime/runner.py). What it shares with the governor's
-control step is in controller/driven_base.py.
+control step is in controller/base/driven_base.py.
 """
 
 from __future__ import annotations
@@ -10,15 +10,15 @@ import math
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from controller.base.drive_lifecycle import Outcome
+from controller.base.driven_base import DriveLoop, DrivenBase
+from controller.base.localise import Localiser
+from controller.base.response_monitor import ResponseMonitor, SpeedCap
 from controller.decision.decision import Decision
 from controller.decision.limits import speed_to_decide_by
 from controller.decision.situation import Situation
-from controller.drive_lifecycle import Outcome
-from controller.driven_base import DriveLoop, DrivenBase
 from controller.follow import PathFollower
-from controller.localise import Localiser
 from controller.path.path import OnPath, Path
-from controller.response_monitor import ResponseMonitor, SpeedCap
 from controller.shape import SpeedShaper
 from hal.api import Chassis
 from hal.types import ChassisState, FloatArray, PlanarPose, Setpoint

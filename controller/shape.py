@@ -25,8 +25,8 @@ from ruckig import (  # type: ignore[import-not-found]  # a compiled module with
 
 from config.robot import Limits
 from controller import braking
+from controller.base.chassis_lag import ChassisLag
 from controller.braking import BrakeLimits
-from controller.chassis_lag import ChassisLag
 from controller.profile import stop_step
 from hal.records import record
 

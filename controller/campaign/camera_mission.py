@@ -14,6 +14,7 @@ from tempfile import TemporaryDirectory
 
 from config.app import AppConfig, LockstepRunner, SimulationConfig
 from config.scenario import as_yaml
+from controller.base.drive_lifecycle import SETTLE_S, Outcome
 from controller.build import (
     build_control_loop,
     build_path,
@@ -27,7 +28,6 @@ from controller.campaign.drive_log import DriveLog
 from controller.campaign.noise_mission import GIVE_UP_S
 from controller.campaign.policies import build_policy
 from controller.campaign.stage import Stage
-from controller.drive_lifecycle import SETTLE_S, Outcome
 from controller.errors import UserError
 from controller.lockstep import run_lockstep
 from controller.mission.scenario_faults import with_slip_and_vibration

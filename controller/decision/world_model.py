@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from config.decision import DecisionConfig
 from config.perception import TYPICAL_DEPTH_NOISE, DepthNoise
 from config.robot import Robot
+from controller.base.localise import PoseHistory
 from controller.decision.bodies import Bodies, no_bodies
 from controller.decision.corridor import Corridor
 from controller.decision.known_places import KnownPlaces
@@ -30,7 +31,6 @@ from controller.decision.situation import SceneError
 from controller.decision.surfaces import NO_SURFACES, check_scan, surfaces_of
 from controller.decision.velocity_filter import SteadyVelocities
 from controller.decision.view_edges import ViewEdges
-from controller.localise import PoseHistory
 from controller.path.path import OnPath, Path
 from hal.clocks import NS_PER_S
 from hal.compiled import compiled

@@ -6,12 +6,12 @@ from collections.abc import Callable
 
 from config.app import AppConfig
 from config.governor import GovernorConfig
+from controller.base.localise import Localiser
+from controller.base.response_monitor import ResponseMonitor
 from controller.build import build_path
 from controller.governor.governor import SpeedGovernor
 from controller.governor.inbox import Inbox
 from controller.governor.loop import Commands, GovernorLoop
-from controller.localise import Localiser
-from controller.response_monitor import ResponseMonitor
 from hal.api import Chassis, DatagramLink
 from hal.geometry import mount_of
 

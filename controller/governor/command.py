@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 from config.app import AppConfig, RealtimeRunner, load_app
 from config.governor import GovernorConfig, InputConfig, UdpInputConfig
+from controller.base.drive_lifecycle import Outcome
 from controller.build import open_commands
 from controller.control import ControlStep
-from controller.drive_lifecycle import Outcome
 from controller.errors import UserError
 from controller.governor.build import build_governor_loop, build_inbox
 from controller.governor.inbox import Inbox

@@ -14,6 +14,8 @@ from config.decision import DecisionConfig
 from config.governor import GovernorConfig
 from config.perception import TYPICAL_DEPTH_NOISE, DepthNoise
 from config.robot import Robot
+from controller.base.localise import PoseHistory
+from controller.base.response_monitor import NO_CAP, SpeedCap
 from controller.decision.camera_limits import condition_limit
 from controller.decision.decide import DecisionMaker
 from controller.decision.decision import Action, Decision, Reason
@@ -27,9 +29,7 @@ from controller.governor.arcs import Kind, MotionRequest, corner_m, driveable, s
 from controller.governor.ground import GroundMemory
 from controller.governor.request import Twist
 from controller.governor.surroundings import GroundLimits
-from controller.localise import PoseHistory
 from controller.path.path import OnPath, Path
-from controller.response_monitor import NO_CAP, SpeedCap
 from controller.shape import SpeedShaper
 from hal.types import CameraMount, PlanarPose
 from vision.scene import CameraCondition, Scene

@@ -9,14 +9,14 @@ from typing import Protocol
 
 import numpy as np
 
+from controller.base.driven_base import DriveLoop, DrivenBase
+from controller.base.localise import Localiser
+from controller.base.response_monitor import ResponseMonitor
 from controller.control import ControlStep
 from controller.decision.decision import Decision
-from controller.driven_base import DriveLoop, DrivenBase
 from controller.governor.governor import SpeedGovernor
 from controller.governor.inbox import RequestState
-from controller.localise import Localiser
 from controller.record.recorder import path_ahead
-from controller.response_monitor import ResponseMonitor
 from hal.api import Chassis
 from hal.types import FloatArray, PlanarPose, Setpoint
 from vision.scene import Scene

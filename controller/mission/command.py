@@ -7,6 +7,7 @@ from contextlib import ExitStack
 from pathlib import Path as FilePath
 
 from config.app import AppConfig, LockstepRunner, load_app
+from controller.base.drive_lifecycle import Outcome
 from controller.build import (
     build_control,
     build_faults,
@@ -17,7 +18,6 @@ from controller.build import (
     surroundings,
 )
 from controller.build_chassis import build_base
-from controller.drive_lifecycle import Outcome
 from controller.errors import UserError
 from controller.lockstep import run_lockstep
 from controller.mission.blind_bends import blind_bend_warning

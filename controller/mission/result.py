@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass, field
 from pathlib import Path as FilePath
 
+from controller.base.drive_lifecycle import Outcome
 from controller.control import ControlLoop, ControlStep
-from controller.drive_lifecycle import Outcome
 from controller.realtime.runner import Punctuality, SceneMessage
 from controller.record.tally import (
     Complaints,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from config.app import AppConfig, RealtimeRunner
 from config.chassis import AgilexChassisConfig, AnyChassisConfig, CanLinkConfig
+from controller.base.drive_lifecycle import Outcome
 from controller.build import build_control
-from controller.drive_lifecycle import Outcome
 from controller.mission.result import MissionOptions, MissionResult
 from controller.realtime.rig import realtime_rig
 from controller.record.tally import SetpointTally

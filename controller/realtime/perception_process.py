@@ -11,10 +11,10 @@ from contextlib import suppress
 from functools import partial
 
 from config.app import AppConfig, RealtimeRunner
+from controller.base.localise import PoseHistory
 from controller.build import build_path, build_perceiver, open_camera, surroundings
 from controller.control import ControlStep
 from controller.errors import UserError, describe
-from controller.localise import PoseHistory
 from controller.realtime.channel import Channel, PeerGone
 from controller.realtime.runner import STREAM_ENDED, CutOff, Farewell, SceneMessage, StepMessage
 from controller.record.recorder import RecordingOptions, RunRecorder, open_recorder

@@ -12,10 +12,10 @@ from multiprocessing.process import BaseProcess
 from typing import Protocol
 
 from config.app import AppConfig, RealtimeRunner
+from controller.base.drive_lifecycle import DriveLifecycle, Outcome
 from controller.build import build_path, build_simulation, require_camera
 from controller.build_chassis import build_base
 from controller.control import Drive
-from controller.drive_lifecycle import DriveLifecycle, Outcome
 from controller.mission.result import MissionOptions
 from controller.realtime.channel import Channel, channel_sockets
 from controller.realtime.perception_process import perceive_forever

@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from config.app import RealtimeRunner
+from controller.base.drive_lifecycle import Outcome
 from controller.control import ControlStep, Drive
-from controller.drive_lifecycle import Outcome
 from controller.lockstep import Outside
 from controller.realtime.channel import Channel, PeerGone
 from controller.realtime.service import ServiceManager, StopRequest

@@ -15,11 +15,11 @@ import numpy as np
 
 from config.app import ReplayConfig, load_replay
 from config.camera import OdometryChoice
+from controller.base.ego_speed import EgoSpeed
 from controller.build import open_replay, straight_ahead
 from controller.decision.decide import DecisionMaker
 from controller.decision.decision import Decision
 from controller.decision.situation import Situation
-from controller.ego_speed import EgoSpeed
 from controller.errors import UserError
 from controller.path.path import OnPath, Path
 from controller.perceive import Look

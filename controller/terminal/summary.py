@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from config.app import AppConfig
+from controller.base.drive_lifecycle import Outcome
 from controller.control import ControlStep
-from controller.drive_lifecycle import Outcome
 from controller.mission.result import DriveResult, MissionResult
 from controller.realtime.runner import Punctuality
 from controller.record.tally import SetpointTally, mean_speed_mps

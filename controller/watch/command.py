@@ -7,6 +7,9 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 
 from config.app import AppConfig, LockstepRunner, RealtimeRunner, load_app
+from controller.base.drive_lifecycle import Outcome
+from controller.base.ego_speed import EgoSpeed
+from controller.base.localise import Localiser
 from controller.build import (
     build_decision,
     build_path,
@@ -15,10 +18,7 @@ from controller.build import (
     straight_ahead,
 )
 from controller.build_chassis import build_listener
-from controller.drive_lifecycle import Outcome
-from controller.ego_speed import EgoSpeed
 from controller.errors import UserError
-from controller.localise import Localiser
 from controller.mission.command import with_overrides
 from controller.mission.result import MissionOptions
 from controller.mission.scenario_faults import with_scenario_faults

@@ -10,11 +10,11 @@ import math
 
 import numpy as np
 
+from controller.base.drive_lifecycle import Outcome
+from controller.base.ego_speed import EgoSpeed
+from controller.base.localise import Localiser
 from controller.control import ControlStep, Decides
 from controller.decision.situation import Situation
-from controller.drive_lifecycle import Outcome
-from controller.ego_speed import EgoSpeed
-from controller.localise import Localiser
 from controller.path.path import OnPath, Path
 from hal.api import ChassisListener
 from hal.clocks import NS_PER_S

@@ -6,7 +6,7 @@ import math
 from types import TracebackType
 from typing import Self
 
-from controller.localise import UNKNOWN
+from controller.base.localise import UNKNOWN
 from hal.types import ChassisMode, ChassisState
 
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from config.robot import Limits
-from controller.guard import GuardLimits, objection
+from controller.base.guard import GuardLimits, objection
 from controller.shape import SpeedShaper
 from hal.types import Setpoint
 

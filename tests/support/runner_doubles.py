@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from controller.base.drive_lifecycle import Outcome
 from controller.control import ControlStep
 from controller.decision.decision import Action, Decision, Reason
-from controller.drive_lifecycle import Outcome
 from controller.perceive import Look
 from hal.types import RgbdFrame, Setpoint
 from tests.support.scenes import ORIGIN, chassis_state, scene

@@ -135,7 +135,7 @@ STEPS = {
         f"def test_{kind}_driver_survives_any_" in read(f"tests/property/test_{kind}_properties.py")
     ),
     "own time-out": lambda kind: f'"{kind}": ' in read("tests/unit/controller/faults/test_faults.py"),
-    "guard": lambda kind: f'"{kind}": {kind}_rig' in read("tests/unit/controller/test_guard.py"),
+    "guard": lambda kind: f'"{kind}": {kind}_rig' in read("tests/unit/controller/base/test_guard.py"),
     "mission and faults": lambda kind: kind in EVERY_BASE,
     "README": lambda kind: kind.lower() in read("README.md").lower(),
 }

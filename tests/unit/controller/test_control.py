@@ -7,13 +7,13 @@ import pytest
 from config.decision import DecisionConfig
 from config.path import LineSpec, PathSpec
 from config.robot import Robot
+from controller.base.drive_lifecycle import Outcome
+from controller.base.localise import Localiser
+from controller.base.response_monitor import ResponseMonitor
 from controller.control import ControlLoop, ControlStep
 from controller.decision.decide import DecisionMaker
-from controller.drive_lifecycle import Outcome
 from controller.follow import PathFollower
-from controller.localise import Localiser
 from controller.path.path import Path
-from controller.response_monitor import ResponseMonitor
 from controller.shape import SpeedShaper
 from hal.api import Chassis
 from hal.types import CameraMount, ChassisMode, ChassisState, PlanarPose, Setpoint

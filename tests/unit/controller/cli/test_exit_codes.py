@@ -9,8 +9,8 @@ import pytest
 from click.testing import CliRunner
 
 from config.robot import Limits
+from controller.base.drive_lifecycle import Outcome
 from controller.cli.commands import cli
-from controller.drive_lifecycle import Outcome
 from controller.governor.command import Governing
 from controller.mission.result import DriveResult, MissionResult
 from controller.record.tally import SetpointTally

@@ -12,15 +12,15 @@ import pytest
 from config.decision import DecisionConfig
 from config.governor import GovernorConfig
 from config.robot import Robot
+from controller.base.drive_lifecycle import ARM_TIMEOUT_S, Outcome
+from controller.base.localise import Localiser
+from controller.base.response_monitor import ResponseMonitor
 from controller.control import ControlStep
 from controller.decision.decision import Decision
-from controller.drive_lifecycle import ARM_TIMEOUT_S, Outcome
 from controller.governor.governor import SpeedGovernor
 from controller.governor.inbox import RequestState
 from controller.governor.loop import GovernorLoop
 from controller.governor.request import Twist
-from controller.localise import Localiser
-from controller.response_monitor import ResponseMonitor
 from hal.types import CameraMount, ChassisMode, ChassisState, PlanarPose, Setpoint
 from tests.support.imperfect_base import ImperfectBase
 from tests.support.obedient_chassis import PERIOD_S, ObedientChassis
@@ -193,7 +193,7 @@ def test_the_way_ahead_is_the_arc_for_pictures() -> None:
 
 
 def test_a_base_that_fell_behind_is_told_zero_and_begins_again_gently() -> None:
-    """controller/response_monitor.py, as in a drive along a path."""
+    """controller/base/response_monitor.py, as in a drive along a path."""
     base = ImperfectBase(unresponsive_s=(3.0, 3.8))
     planner = Planner(lambda _: GO)
     governor = SpeedGovernor(GovernorConfig(), DecisionConfig(), ROBOT, MOUNT, PERIOD_S)

@@ -11,8 +11,8 @@ import pytest
 
 from config.governor import GovernorConfig
 from config.robot import Robot
+from controller.base.response_monitor import SpeedCap
 from controller.governor.request import Twist
-from controller.response_monitor import SpeedCap
 from tests.support.closed_loop import PERIOD_S, Box, standing_at, walking
 from tests.support.governed_drive import GovernedDrive, after, last_sentence, rules
 from vision.scene import Scene
@@ -95,7 +95,7 @@ def test_turn_in_place_is_refused_beside_a_body_too_near_to_be_measured() -> Non
 
 
 def test_turn_in_place_ends_where_the_base_runs_away_ahead(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A base that moves ahead at a command of 0 gets a cap of 0 (controller/response_monitor.py)."""
+    """A base that moves ahead at a command of 0 gets a cap of 0 (controller/base/response_monitor.py)."""
     drive = GovernedDrive(lambda _: Twist(0.0, 0.5))
     assert drive.run(4.0)[-1].governed.w_radps == pytest.approx(0.5)
     monkeypatch.setattr(drive.governor, "step", partial(drive.governor.step, cap=SpeedCap(0.0, hard=True)))

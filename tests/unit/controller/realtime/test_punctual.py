@@ -7,7 +7,7 @@ from itertools import pairwise
 import pytest
 
 from config.robot import Limits
-from controller.guard import GuardedChassis, GuardLimits
+from controller.base.guard import GuardedChassis, GuardLimits
 from controller.realtime.punctual import PunctualChassis
 from hal.clocks import SimulatedClock
 from hal.types import ChassisMode, ChassisState, Setpoint

@@ -12,9 +12,9 @@ import pytest
 
 from config.app import RealtimeRunner, load_app
 from config.loader import CONFIG_DIR
+from controller.base.drive_lifecycle import Outcome
 from controller.build import build_control
 from controller.control import ControlLoop
-from controller.drive_lifecycle import Outcome
 from controller.mission.result import MissionOptions
 from controller.realtime import rig as realtime_rig
 from controller.realtime.channel import Channel, PeerGone, channel_sockets

@@ -3,7 +3,7 @@ from collections.abc import Iterator
 import pytest
 
 from config.app import RealtimeRunner
-from controller.drive_lifecycle import Outcome
+from controller.base.drive_lifecycle import Outcome
 from controller.realtime.channel import Channel, channel_sockets
 from controller.realtime.runner import (
     CutOff,

@@ -13,7 +13,7 @@ import pytest
 
 from config.app import load_app, load_replay
 from config.loader import CONFIG_DIR
-from controller.ego_speed import EgoSpeed
+from controller.base.ego_speed import EgoSpeed
 from controller.errors import UserError
 from controller.replay.command import ReplayOptions, recorded_mount, run_replay
 from hal.cameras.tum_replay import TumReplay

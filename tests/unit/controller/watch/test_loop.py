@@ -11,8 +11,8 @@ import pytest
 
 from config.app import load_app
 from config.loader import CONFIG_DIR
+from controller.base.drive_lifecycle import Outcome
 from controller.control import ControlStep
-from controller.drive_lifecycle import Outcome
 from controller.watch.command import build_watch_loop
 from controller.watch.loop import WatchLoop
 from controller.watch.no_base import NoBase

@@ -3,7 +3,7 @@ from dataclasses import replace
 
 import pytest
 
-from controller.drive_lifecycle import (
+from controller.base.drive_lifecycle import (
     ARM_TIMEOUT_S,
     MEASURED_REST_MPS,
     MEASURED_REST_RADPS,

@@ -8,9 +8,9 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from controller.drive_lifecycle import DriveLifecycle, Outcome
-from controller.localise import Localiser
-from controller.response_monitor import NO_CAP, ResponseMonitor, SpeedCap
+from controller.base.drive_lifecycle import DriveLifecycle, Outcome
+from controller.base.localise import Localiser
+from controller.base.response_monitor import NO_CAP, ResponseMonitor, SpeedCap
 from hal.api import Chassis
 from hal.types import ChassisMode, ChassisState, Setpoint
 from vision.scene import Scene

@@ -1,6 +1,6 @@
 """How a drive begins and ends: it arms the chassis, takes requests to stop, and tells when the robot rests.
 
-controller/driven_base.py calls it in each step of both control loops.
+controller/base/driven_base.py calls it in each step of both control loops.
 """
 
 from __future__ import annotations

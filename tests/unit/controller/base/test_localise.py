@@ -4,7 +4,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from controller.localise import Localiser, PoseHistory
+from controller.base.localise import Localiser, PoseHistory
 from hal.geometry import advance_pose, camera_in_body
 from hal.types import CameraMount, PlanarPose, Pose
 from vision.scene import EgoMotion

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from controller.chassis_lag import ChassisLag
+from controller.base.chassis_lag import ChassisLag
 
 STEP_S = 0.02
 

@@ -22,7 +22,7 @@ from collections import deque
 
 import numpy as np
 
-from controller.contradiction import Contradiction, Motion
+from controller.base.contradiction import Contradiction, Motion
 from hal.clocks import NS_PER_S
 from hal.geometry import body_in_floor, camera_in_body, camera_in_floor, wrap_angle_rad
 from hal.types import CameraMount, PlanarPose, Pose

@@ -7,10 +7,10 @@ import math
 import pytest
 
 from config.robot import Robot
+from controller.base.drive_lifecycle import Outcome
+from controller.base.response_monitor import ResponseMonitor, SpeedCap
 from controller.control import ControlStep
-from controller.drive_lifecycle import Outcome
 from controller.record.tally import SetpointTally
-from controller.response_monitor import ResponseMonitor, SpeedCap
 from tests.support.imperfect_base import ImperfectBase
 from tests.support.obedient_chassis import PERIOD_S
 from tests.unit.controller.test_control import drive, loop_on

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from config.robot import Robot
-from controller.contradiction import Contradiction, Motion
+from controller.base.contradiction import Contradiction, Motion
+from controller.base.drive_lifecycle import Outcome
+from controller.base.driven_base import DrivenBase
+from controller.base.localise import Localiser
+from controller.base.response_monitor import ResponseMonitor
 from controller.control import ControlStep
-from controller.drive_lifecycle import Outcome
-from controller.driven_base import DrivenBase
-from controller.localise import Localiser
-from controller.response_monitor import ResponseMonitor
 from hal.geometry import camera_in_body
 from hal.types import Pose, Setpoint
 from tests.support.obedient_chassis import PERIOD_S, ObedientChassis

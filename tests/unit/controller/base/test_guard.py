@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 
 from config.robot import Limits
-from controller import guard
-from controller.guard import GuardedCanLink, GuardedChassis, GuardLimits, objection, self_check
+from controller.base import guard
+from controller.base.guard import GuardedCanLink, GuardedChassis, GuardLimits, objection, self_check
 from hal.chassis.agilex import COMMANDS
 from hal.errors import LinkLost
 from hal.links.scripted import ScriptedCanLink
