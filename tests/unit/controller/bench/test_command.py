@@ -93,7 +93,9 @@ def test_text_is_the_json() -> None:
 def test_the_table_says_what_was_measured() -> None:
     lines = list(report().lines())
     (row,) = [line for line in lines if line.startswith("simulated 640x480")]
-    assert " ".join(row.split()[2:]) == "4.32 8.64 4.80 9.60 3.60 1.20 4.00 1.20 1.21 8.00 0.60 14.40 5.00 10.00"
+    assert (
+        " ".join(row.split()[2:]) == "4.32 8.64 4.80 9.60 3.60 1.20 4.00 1.20 1.21 8.00 0.60 14.40 5.00 10.00"
+    )
     text = "\n".join(lines)
     assert "A CPU, 2 cores" in lines[0]
     assert "0.10 + 0.50" in text
