@@ -3,7 +3,7 @@
 Steps, with their modules: velocities of fragments (least_squares); arrived and stayed surfaces (arrivals);
 cells to tracks (masks, connected, votes, grouping, births); suspects and furniture cut out (carving,
 left_behind, cutting); movers extended to the floor (grounding); bodies joined and divided (merging,
-division); filters (sightings, rim_motion); fragments to tracks (adoption); velocities of bodies
+division); filters (sightings, rim_motion, approach); fragments to tracks (adoption); velocities of bodies
 (least_squares); verdict (judgement); report. Terms: vision/__init__.py.
 """
 
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from config.perception import PerceptionConfig
 from hal.types import FloatArray, PlanarPose
 from vision.bodies import (
+    approach,
     births,
     carving,
     cutting,
@@ -113,8 +114,10 @@ class Tracker:
             tracks, detection, occlusion.with_occlusion(grid, labels, measured), self._config.depth_noise
         )
         rims = self._rims.velocities(grid, labels, tracks, pose, detection.captured_ns)
+        nearing = self._nearing(detection, labels)
         if detection.dt_s > 0:
             rim_motion.fuse(tracks, rims, detection.dt_s)
+            approach.fuse(tracks, nearing, pose.translation_m, detection.dt_s)
         max_mps = self._config.motion.max_speed_mps
         sightings.forget_implausible(tracks, IMPLAUSIBLE_SPEED_FACTOR * max_mps, max_mps)
         if tracks.overhead.any():
@@ -122,9 +125,23 @@ class Tracker:
         owner = adopt(tracks, detection, whole, owner, self._config.depth_noise)
         arrivals = masks.count_cells(whole, changes.arrived_cells, len(tracks))
         if detection.dt_s > 0 and len(tracks):
-            self._measure_velocities(detection, owner, velocities, arrivals, measured.cells, rims)
+            self._measure_velocities(detection, owner, velocities, arrivals, measured.cells, rims, nearing)
         self._surfaces = masks.surfaces(grid, labels, tracks.ids, pose)
         return owner
+
+    def _nearing(self, detection: Detection, labels: IntGrid) -> approach.Approach:
+        """Speeds towards the camera of tracks that are not known to move, with the cells labels (h, w)."""
+        asked, noise = ~self._tracks.moving, self._config.depth_noise
+        return approach.measure(
+            detection.grid,
+            labels,
+            self._tracks,
+            asked,
+            self._free,
+            detection.pose,
+            detection.captured_ns,
+            noise,
+        )
 
     def _label(
         self,
@@ -217,6 +234,7 @@ class Tracker:
         arrivals: NDArray[np.intp],
         cells: NDArray[np.intp],
         rims: rim_motion.RimVelocities,
+        nearing: approach.Approach,
     ) -> None:
         """One weighted least squares per body, fused into its filter; then the verdict."""
         tracks, settings = self._tracks, self._config.motion
@@ -247,9 +265,12 @@ class Tracker:
             tracks.update_with_fragments(use, velocity, noise)
         tracks.restless_s = _sustained(tracks.restless_s, limbs.restless(body), detection.dt_s)
         tracks.arriving_s = _sustained(tracks.arriving_s, arriving(arrivals, cells), detection.dt_s)
+        tracks.approach_s = approach.approaching_s(tracks.approach_s, nearing, detection.dt_s)
         tracks.rim_s = rim_motion.one_way_s(tracks.rim_s, rims, settings.sigmas, detection.dt_s)
         advances = tracks.update_trailing_average(detection.dt_s)
-        seen = evidence_of(tracks, detection, body, advances, arrivals, cells, rims, self._config.depth_noise)
+        seen = evidence_of(
+            tracks, detection, body, advances, arrivals, cells, rims, nearing, self._config.depth_noise
+        )
         verdict = judge(seen, tracks.evidence, tracks.moving, detection.dt_s, settings)
         tracks.evidence, tracks.moving = verdict.evidence, verdict.moving
         tracks.confidence, tracks.surely_static = verdict.confidence, verdict.surely_static

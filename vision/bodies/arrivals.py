@@ -37,7 +37,7 @@ _SIGMAS = 3.5  # of the difference compared: exceeded by chance in 2 of 10000 ce
 # Noise of a cell between two frames relative to that of a pixel, as measured over time. A cell is a median
 # over 25 cells of four samples each, and neighbours share their noise. Within one frame, for heights over the
 # floor, the factor is CELL_HEIGHT_NOISE (vision/depth/depth_grid.py).
-_CELL_NOISE_OVER_TIME = 0.55
+CELL_NOISE_OVER_TIME = 0.55
 _SURELY = 0.5  # share of the margin within which a surface surely is the same
 _NEIGHBOURS = 5  # at least this many of a cell and its eight neighbours must have arrived
 # Of one surface: fewer arrived cells, or a smaller share of it, come and go with noise at a rim. A walking
@@ -56,11 +56,18 @@ def arriving(arrived: NDArray[np.intp], cells: NDArray[np.intp]) -> NDArray[np.b
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Memory:
+class View:
+    """What was seen a moment ago.
+
+    pose: of the camera in the fixed frame.
+    nearest_inverse: 1/m, of the nearest surface in 3x3 cells; _UNKNOWN where not measured, (h, w).
+    inverse: 1/m, of the surface in the cell itself; 0 where not measured, (h, w).
+    """
+
     stamp_ns: int
     pose: Pose
-    nearest_inverse: FloatGrid  # 1/m, of the nearest surface in 3x3 cells; _UNKNOWN where not measured
-    inverse: FloatGrid  # 1/m, of the surface in the cell itself; 0 where not measured
+    nearest_inverse: FloatGrid
+    inverse: FloatGrid
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,7 +93,7 @@ class ViewMemory:
 
     def __init__(self, noise: DepthNoise) -> None:
         self._noise = noise
-        self._memories: list[_Memory] = []
+        self._memories: list[View] = []
 
     def clear(self) -> None:
         """Forget all views: their poses cannot be compared with those to come."""
@@ -96,7 +103,7 @@ class ViewMemory:
         """Which of the cells of mask (h, w) have arrived and which have stayed."""
         arrived, stayed, stayed_s = np.zeros(mask.shape, np.bool_), np.zeros(mask.shape, np.bool_), 0.0
         for wanted_s in _LOOK_BACK_S:
-            memory = self._memory_of(now_ns, wanted_s)
+            memory = self.view_of(now_ns, wanted_s)
             if memory is None:
                 continue
             nearer, same = self._compare(grid, mask, pose, memory.pose, memory.nearest_inverse)
@@ -114,7 +121,7 @@ class ViewMemory:
         front of a wall is distinguished from it up to 3.5 m away. Only neighbours in mask confirm a cell. No
         cells, and 0.0 s, if there is no view of that time.
         """
-        memory = self._memory_of(now_ns, wanted_s)
+        memory = self.view_of(now_ns, wanted_s)
         if memory is None:
             return np.zeros(mask.shape, np.bool_), 0.0
         _, same = self._compare(grid, mask, pose, memory.pose, memory.inverse, _SURELY)
@@ -123,7 +130,7 @@ class ViewMemory:
 
     def resolves_m(self, distance_m: FloatArray) -> FloatArray:
         """(N,) minimum difference in depth at which two surfaces at distance_m (N,) can be distinguished."""
-        noise_1pm = _SIGMAS * math.sqrt(2.0) * _CELL_NOISE_OVER_TIME * self._noise.quadratic_per_m
+        noise_1pm = _SIGMAS * math.sqrt(2.0) * CELL_NOISE_OVER_TIME * self._noise.quadratic_per_m
         result: FloatArray = _MARGIN_M + noise_1pm * np.square(distance_m)
         return result
 
@@ -136,11 +143,11 @@ class ViewMemory:
         # Where the measured depth is beyond the range, space was seen free up to the range, no farther.
         nearest[grid.beyond] = np.float32(1.0 / grid.range_m)
         cv2.dilate(nearest, NEIGHBOURHOOD, nearest)
-        self._memories.append(_Memory(now_ns, pose, nearest, grid.inverse_depth))
+        self._memories.append(View(now_ns, pose, nearest, grid.inverse_depth))
         horizon_ns = now_ns - int(1e9 * _KEPT_FOR_S)
         self._memories = [m for m in self._memories if m.stamp_ns >= horizon_ns]
 
-    def _memory_of(self, now_ns: int, wanted_s: float) -> _Memory | None:
+    def view_of(self, now_ns: int, wanted_s: float) -> View | None:
         """The view closest to wanted_s ago, if there is one within 0.5 to 1.5 times of it."""
         best, gap = None, (_OLDEST - 1.0) * wanted_s
         for memory in self._memories:
@@ -162,7 +169,7 @@ class ViewMemory:
 
         seen_inverse (h, w): 1/m, of that surface. margin: as a share of the usual one.
         """
-        sigma_1pm = math.sqrt(2.0) * _CELL_NOISE_OVER_TIME * self._noise.quadratic_per_m
+        sigma_1pm = math.sqrt(2.0) * CELL_NOISE_OVER_TIME * self._noise.quadratic_per_m
         margin_m, noise_1pm = np.float32(margin * _MARGIN_M), np.float32(margin * _SIGMAS * sigma_1pm)
         return _compared(grid, mask, pose, old_pose, seen_inverse, margin_m, noise_1pm)
 

@@ -19,6 +19,8 @@ squared threshold suffices.
   change of viewpoint or a growing surface explains.
 * Free rims (by_rim): the outline of a compact body, where nothing nearer hides it, goes one way for longer
   than the outline of something static does, or it confirms a likely level motion of the filter.
+* Approach (by_approach): the depth of the surface, cell by cell, has come nearer for longer and more clearly
+  than noise explains. It needs neither an outline nor a whole body.
 
 All kinds need a known motion of the camera and, except where arrival alone is proof, more than the minimum
 speed. Bodies that are implausibly fast or wide prove nothing.

@@ -12,6 +12,7 @@ from config.perception import DepthNoise
 from hal.compiled import compiled
 from hal.types import Flags, FloatArray, Integers, Matrices, Matrix, Vector
 from vision.bodies import sightings
+from vision.bodies.approach import Approach
 from vision.bodies.rim_motion import RimVelocities
 from vision.bodies.tracks import Tracks
 from vision.depth.depth_noise import depth_sigma_m
@@ -48,6 +49,9 @@ class MotionEvidence:
     rim_mps: speed across the line of sight by its free rims, 0 where they show none.
     rim_sigmas: how many standard deviations rim_mps is from zero.
     rim_s: for how long they have shown motion without a break.
+    approach_mps: speed towards the camera by the depth of the surface, 0 where it shows none.
+    approach_sigmas: how many standard deviations approach_mps is from zero.
+    approach_s: for how long it has been clear without a break.
     view_radps: how fast the viewing direction changes.
     growth_mps: speed of the centre that a growing or shrinking visible part can explain.
     advances: the centre really advances about as fast as the velocity says.
@@ -79,6 +83,9 @@ class MotionEvidence:
     rim_mps: Vector
     rim_sigmas: Vector
     rim_s: Vector
+    approach_mps: Vector
+    approach_sigmas: Vector
+    approach_s: Vector
     view_radps: Vector
     growth_mps: Vector
     advances: Flags
@@ -97,12 +104,13 @@ def evidence_of(
     arrived: NDArray[np.intp],
     cells: NDArray[np.intp],
     rims: RimVelocities,
+    approach: Approach,
     noise: DepthNoise,
 ) -> MotionEvidence:
     """Gather the evidence of this frame; the filters of tracks have to be updated before.
 
-    body, rims: velocities of the tracks by their fragments and free rims. advances, arrived, cells (T,): see
-    MotionEvidence.
+    body, rims, approach: velocities of the tracks by their fragments, free rims and depth.
+    advances, arrived, cells (T,): see MotionEvidence.
     """
     rotation = detection.pose.rotation
     sight, distance_m = tracks.sight(detection.pose.translation_m)
@@ -128,6 +136,9 @@ def evidence_of(
         rim_mps=rims.mps,
         rim_sigmas=rims.sigmas,
         rim_s=np.abs(tracks.rim_s),
+        approach_mps=approach.mps,
+        approach_sigmas=approach.sigmas,
+        approach_s=tracks.approach_s,
         growth_mps=tracks.growth_mps,
         up=sightings.floor_normal(detection),
         view_radps=view_radps(detection, sight, distance_m),

@@ -25,6 +25,7 @@ from vision.bodies.proof_rules import (
     Surface,
     Velocity,
     arrival_of,
+    by_approach,
     by_arrival,
     by_fragments,
     by_rim,
@@ -151,6 +152,7 @@ def _proofs(
             or by_unrest(filtered, track_ends, threshold)
             or by_arrival(filtered, arrival.some, threshold)
             or by_surface(centre, surface, least_mps[t], dt_s, threshold)
+            or by_approach(seen.approach_mps[t], seen.approach_s[t], least_mps[t], dt_s)
             or (by_rim(rim, filtered, size_m, least_mps[t], dt_s, threshold) and rim.speed_mps <= fastest_mps)
         )
         # The place where a mover has stopped was free a moment ago, so its arrival there is no proof.

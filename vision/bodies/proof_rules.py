@@ -26,6 +26,8 @@ _LASTING_RIM_S = 0.12  # rims of static surfaces seldom show motion in three suc
 _MEASURED_ACROSS_S = 0.25  # static surfaces seldom show a false speed across the line of sight for longer
 _MEASURED_ALONG_S = 0.5  # somewhat longer along it, where neighbours share the noise of depth
 _CLEAR_WAY = 4.0  # times the depth noise of one pixel: shared noise never shows so large a displacement
+# Depth of what is static seldom seems to change towards the camera in one frame, never for so long.
+_LASTING_APPROACH_S = 0.12
 _MEASURED_FRAMES = 2.5  # frame intervals: at least three frames at a low frame rate
 EVEN_CELLS = 48  # fewer cells lie on 2 or 3 patches of depth noise, and move back and forth with them
 _COMPACT_M = 2.2  # a tall person; larger things are seen in part only, and their centre wanders
@@ -201,6 +203,12 @@ def by_rim(
     confirms = rim.sigmas > CONFIRMING_SIGMAS and filtered.level > _LEVEL_SHARE * threshold
     compact = size_m <= _COMPACT_M
     return (lasting or confirms) and compact and rim.speed_mps > least_mps + rim.wander_mps
+
+
+@inlined
+def by_approach(approach_mps: float, shown_s: float, least_mps: float, dt_s: float) -> bool:
+    """Whether the surface has come nearer for too long to be chance, at approach_mps."""
+    return shown_s >= max(_LASTING_APPROACH_S, _MEASURED_FRAMES * dt_s) and approach_mps > least_mps
 
 
 @inlined

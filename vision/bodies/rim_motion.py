@@ -251,4 +251,4 @@ def fuse(tracks: Tracks, rims: RimVelocities, dt_s: float) -> None:
     along = direction[:, :, None] * direction[:, None, :]
     noise = _UNKNOWN_MPS**2 * (np.eye(3) - along) + variance[:, None, None] * along
     velocity = rims.mps[use, None] * direction
-    tracks.update_with_rims(use, velocity, noise)
+    tracks.update_with_surface(use, velocity, noise)

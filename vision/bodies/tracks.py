@@ -78,6 +78,7 @@ class Tracks:
     # Time in which part of the surface was newly arrived, less the time in which none was.
     arriving_s: Vector = _column(float)
     rim_s: Vector = _column(float)  # for how long its free rims have gone one way; negative to the left
+    approach_s: Vector = _column(float)  # for how long its surface has come nearer
     _next_id: int = field(default=1, init=False)
 
     def __len__(self) -> int:
@@ -213,12 +214,12 @@ class Tracks:
         """As update_with_centre, but the centre tells nothing about the velocity."""
         self._apply(kalman.reset_position, index, position_m, noise)
 
-    def update_with_rims(self, index: Integers, velocity_mps: FloatArray, noise: FloatArray) -> None:
-        """Update both filters of tracks index (K,) with velocities (K, 3), noise (K, 3, 3), of their rims."""
+    def update_with_surface(self, index: Integers, velocity_mps: FloatArray, noise: FloatArray) -> None:
+        """Update both filters of tracks index (K,) with velocities of the surface (K, 3), noise (K, 3, 3)."""
         self._apply(kalman.update, index, velocity_mps, noise, kalman.VELOCITY)
 
     def update_with_fragments(self, index: Integers, velocity_mps: FloatArray, noise: FloatArray) -> None:
-        """As update_with_rims, with velocities of fragments; the filter of the surface does not take them."""
+        """The same with velocities of fragments, which the filter of the surface does not take."""
         state, covariance = self.state.take(index, axis=0), self.covariance.take(index, axis=0)
         self.state[index], self.covariance[index] = kalman.update(
             state, covariance, velocity_mps, noise, kalman.VELOCITY
