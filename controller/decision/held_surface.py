@@ -3,7 +3,8 @@
 A surface that sinks below the view, rises above it or passes beside it is still there, so it is held. A long
 wall beside the corridor leaves the view little by little: its nearest visible point recedes as fast as the
 robot drives. What vanishes while the robot stands has gone away; a sill that sank below the view before the
-robot came to rest has not. controller/decision/sight.py notes the nearest surface once a scene.
+robot came to rest has not. A surface that is seen as before, but belongs to a body now, has not left the view
+and is not held. controller/decision/sight.py notes the nearest surface once a scene.
 """
 
 from __future__ import annotations
@@ -38,16 +39,25 @@ class HeldSurface:
         self._seen_at_rest = False
 
     def note(
-        self, nearest_s_m: float, s_m: float, blind_s_m: float, captured_ns: int, standing: bool
+        self,
+        nearest_s_m: float,
+        s_m: float,
+        blind_s_m: float,
+        captured_ns: int,
+        standing: bool,
+        explained_s_m: float = math.inf,
     ) -> None:
         """Take in the nearest surface of one scene.
 
         s_m: of the robot. blind_s_m: up to here surfaces may leave the view because the robot drives on.
-        standing: the robot was at rest.
+        standing: the robot was at rest. explained_s_m: of the surface that is seen across the same way, but
+        belongs to a body; inf: none.
         """
         self._nearest.append(nearest_s_m)
         steady = sorted(self._nearest)[len(self._nearest) // 2]
         receded = steady > self._closest_s_m + _RECEDES_M and self._closest_s_m < blind_s_m
+        explained = abs(explained_s_m - self._closest_s_m) <= SAME_SURFACE_M
+        receded &= not explained
         if standing:
             self._driving_s_m = math.inf
             self._forget_what_has_gone(steady)
@@ -59,7 +69,7 @@ class HeldSurface:
         self._forget_what_is_behind(s_m)
         if abs(steady - self._about_s_m) > SAME_SURFACE_M:
             self._about_s_m, self._about_since_ns = steady, captured_ns
-        keeps = not standing and s_m < self._closest_s_m < blind_s_m
+        keeps = not standing and not explained and s_m < self._closest_s_m < blind_s_m
         self._closest_s_m = min(steady, self._closest_s_m) if keeps else steady
         self.s_m = min(steady, self._driving_s_m, self._lasting_s_m)
 

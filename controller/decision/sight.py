@@ -34,6 +34,8 @@ _LANES = 5  # points across the width of a cell
 # If the view's upper edge hardly rises, a surface that vanishes farther away than this has not gone out of
 # view upwards: it was flicker.
 _MAX_ABOVE_M = 3.0
+# Bodies explain a surface that was on no body before if they cover this share of its width.
+_EXPLAINED_SHARE = 0.8
 # Surfaces are looked for this much farther along the path than the range of sight.
 _BEYOND_RANGE_M = 2.0
 
@@ -62,6 +64,7 @@ class Sight:
         self._assumed_free_s_m = start_s_m + mount.forward_m + self._near_m + _CELL_M
         self._surface = HeldSurface()
         self.surface_clearance_m = math.inf
+        self._surface_d_m = 0.0, 0.0  # from where to where across the path the nearest surface was seen
         self.known_s_m = self._assumed_free_s_m
         self.corners = BlindCorners(config.sight)
 
@@ -88,10 +91,11 @@ class Sight:
         """
         self._update_view_edges(free)
         on_path = self._on_path(surfaces, s_m)
+        belongs = surfaces.of(explained_by)
         in_corridor, nearest_s, clearance_m, stands = _surfaces_in_corridor(
             on_path,
             surfaces.half_band_m,
-            surfaces.of(explained_by),
+            belongs,
             explained_by.moving,
             s_m,
             self._lateral_m,
@@ -100,9 +104,28 @@ class Sight:
         self.corners.look(on_path, stands, 2.0 * free.half_width_tan, s_m + self._corridor.front_m)
         if nearest_s < math.inf:
             self.surface_clearance_m = clearance_m
+        explained_s = self._explained(on_path, in_corridor, np.asarray(belongs.any(axis=1)), nearest_s)
         blind_s_m = s_m + self._mount.forward_m + self._out_of_view_within_m
-        self._surface.note(nearest_s, s_m, blind_s_m, captured_ns, standing)
+        self._surface.note(nearest_s, s_m, blind_s_m, captured_ns, standing, explained_s)
         self._note_floor(free, pose, s_m, captured_ns, in_corridor)
+
+    def _explained(
+        self, on_path: SurfacesOnPath, in_corridor: BoolArray, explained: BoolArray, nearest_s: float
+    ) -> float:
+        """Path coordinate of the surface in the corridor that bodies explain, where the nearest unexplained
+        one was last seen across the path; inf: they cover too little of it.
+
+        explained (P,): which surfaces belong to bodies. nearest_s: of the nearest unexplained one.
+        """
+        counts = in_corridor[on_path.bands]
+        if nearest_s < math.inf:
+            there = counts & ~explained & (on_path.s_m <= nearest_s + SAME_SURFACE_M)
+            self._surface_d_m = float(on_path.d_m[there].min()), float(on_path.d_m[there].max())
+        low, high = self._surface_d_m
+        counts = counts & explained & (on_path.d_m >= low) & (on_path.d_m <= high)
+        if not counts.any() or np.ptp(on_path.d_m[counts]) < _EXPLAINED_SHARE * (high - low):
+            return math.inf
+        return float(on_path.s_m[counts].min())
 
     def _on_path(self, surfaces: Surfaces, s_m: float) -> SurfacesOnPath:
         """The surfaces in path coordinates, as far as the camera sees from s_m."""

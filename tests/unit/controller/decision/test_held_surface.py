@@ -24,15 +24,23 @@ class Drive:
             self._note(nearest_s_m, standing=False)
         return self.held.s_m
 
+    def on_explained(self, explained_s_m: float, frames: int) -> float:
+        """The surface is seen as before, but belongs to a body now."""
+        for _ in range(frames):
+            self.s_m += 0.01
+            self._note(math.inf, standing=False, explained_s_m=explained_s_m)
+        return self.held.s_m
+
     def rest(self, nearest_s_m: float, frames: int = 5) -> float:
         for _ in range(frames):
             self._note(nearest_s_m, standing=True)
         return self.held.s_m
 
-    def _note(self, nearest_s_m: float, standing: bool) -> None:
+    def _note(self, nearest_s_m: float, standing: bool, explained_s_m: float = math.inf) -> None:
         self.frame += 1
         blind_s_m = self.s_m + BLIND_M
-        self.held.note(nearest_s_m, self.s_m, blind_s_m, self.frame * FRAME_NS, standing)
+        now_ns = self.frame * FRAME_NS
+        self.held.note(nearest_s_m, self.s_m, blind_s_m, now_ns, standing, explained_s_m)
 
 
 def seen_until_below_the_view(frames_before: int) -> Drive:
@@ -55,6 +63,22 @@ def test_one_that_was_seen_for_a_moment_is_held_while_the_robot_drives() -> None
     drive = seen_until_below_the_view(6)
     assert drive.on(math.inf, 5) == pytest.approx(2.4)
     assert drive.rest(math.inf) == math.inf
+
+
+def test_one_that_belongs_to_a_body_now_has_not_left_the_view() -> None:
+    """The flank of a truck right before the robot: too large for a box until only its end is in view."""
+    drive = Drive()
+    drive.on(2.4, 28)
+    assert drive.on_explained(2.45, 30) == math.inf
+    assert drive.on(math.inf, 5) == math.inf
+    assert drive.rest(math.inf) == math.inf
+
+
+def test_a_body_elsewhere_explains_nothing() -> None:
+    drive = Drive()
+    drive.on(2.4, 28)
+    drive.on_explained(3.0, 5)
+    assert drive.rest(math.inf, 300) == pytest.approx(2.4)
 
 
 def test_a_moment_does_not_replace_what_lasts() -> None:
