@@ -21,6 +21,7 @@ from config.robot import Robot
 from controller.base.localise import PoseHistory
 from controller.decision.bodies import Bodies, no_bodies
 from controller.decision.corridor import Corridor
+from controller.decision.cut_movers import with_hidden_near_sides
 from controller.decision.known_places import KnownPlaces
 from controller.decision.lens_cover import LensCover
 from controller.decision.limits import STANDING_MPS
@@ -182,7 +183,7 @@ class WorldModel:
         boxes = self._out_of_view.mark_leaving_movers(boxes, pose, edges)
         standing = v_mps <= STANDING_MPS
         remembered = self._out_of_view.update(self._boxes, boxes, pose, edges, standing, free)
-        self.bodies = boxes.joined(remembered)
+        self.bodies = with_hidden_near_sides(boxes, pose, self._mount, edges).joined(remembered)
         self._boxes, self._seen, self._boxed, self._unboxed = boxes, seen, boxed, None
         self.lens.look(free, self.corridor.half_width_at(s_m), self._mount.left_m)
         self.sight.look(free, surfaces, pose, s_m, scene.captured_ns, boxes, standing)
