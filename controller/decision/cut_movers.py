@@ -14,7 +14,8 @@ import numpy as np
 
 from controller.decision.bodies import Bodies
 from controller.decision.view_edges import ViewEdges
-from hal.types import CameraMount, PlanarPose
+from hal.compiled import compiled
+from hal.types import CameraMount, FloatArray, PlanarPose
 
 # How much nearer it may extend: about the width of a vehicle in a hall.
 _HIDDEN_M = 1.0
@@ -29,17 +30,28 @@ def with_hidden_near_sides(boxes: Bodies, pose: PlanarPose, mount: CameraMount, 
     """The boxes, those of movers that come in over the edge of the view extended towards the robot."""
     if not np.count_nonzero(boxes.moving):
         return boxes
-    cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
-    forward, leftward = np.array([cos, sin]), np.array([-sin, cos])
-    offset = boxes.xy_m - (pose.x_m, pose.y_m)
-    ahead, left = offset @ forward - mount.forward_m, offset @ leftward - mount.left_m
-    near = ahead - boxes.half_view_m
-    side = np.where(left < 0.0, -1.0, 1.0)
-    inner = side * left - boxes.half_across_m
-    inwards, along = -side * (boxes.velocity_mps @ leftward), np.abs(boxes.velocity_mps @ forward)
-    cut = boxes.moving & (near > 0.0) & (inner >= (1.0 - _INSIDE_SHARE) * edges.edge_tan * near - _INSIDE_M)
-    cut &= inwards > np.maximum(along, _MIN_INWARDS_MPS)
-    if not np.count_nonzero(cut):
+    hidden_m = _hidden(boxes, pose, mount, edges)
+    if not np.count_nonzero(hidden_m):
         return boxes
-    half_m = np.where(cut, 0.5 * np.minimum(_HIDDEN_M, near), 0.0)
-    return replace(boxes, xy_m=boxes.xy_m - half_m[:, None] * forward, half_view_m=boxes.half_view_m + half_m)
+    backwards = np.array([-math.cos(pose.heading_rad), -math.sin(pose.heading_rad)])
+    xy_m = boxes.xy_m + 0.5 * hidden_m[:, None] * backwards
+    return replace(boxes, xy_m=xy_m, half_view_m=boxes.half_view_m + 0.5 * hidden_m)
+
+
+@compiled(Bodies, PlanarPose, CameraMount, ViewEdges)
+def _hidden(bodies: Bodies, pose: PlanarPose, mount: CameraMount, edges: ViewEdges) -> FloatArray:
+    """(N,) by how much the bodies may extend nearer than their boxes, at most to the camera."""
+    cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
+    hidden_m = np.zeros(len(bodies.moving))
+    for k in range(len(hidden_m)):
+        dx, dy = bodies.xy_m[k, 0] - pose.x_m, bodies.xy_m[k, 1] - pose.y_m
+        near_m = dx * cos + dy * sin - mount.forward_m - bodies.half_view_m[k]
+        left_m = dy * cos - dx * sin - mount.left_m
+        vx, vy = bodies.velocity_mps[k]
+        along_mps, inwards_mps = abs(vx * cos + vy * sin), math.copysign(1.0, left_m) * (vx * sin - vy * cos)
+        inner_m = abs(left_m) - bodies.half_across_m[k]
+        on_edge = inner_m >= (1.0 - _INSIDE_SHARE) * edges.edge_tan * near_m - _INSIDE_M
+        comes_in = inwards_mps > max(along_mps, _MIN_INWARDS_MPS)
+        if bodies.moving[k] and near_m > 0.0 and on_edge and comes_in:
+            hidden_m[k] = min(_HIDDEN_M, near_m)
+    return hidden_m
