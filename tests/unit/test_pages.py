@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import importlib
+import re
+from pathlib import Path
 
 import pytest
 
@@ -48,3 +50,13 @@ def test_every_key_they_name_is_one(key: str) -> None:
 @pytest.mark.parametrize("from_file", ["README.md", "CONTRIBUTING.md", "docs/design.md"])
 def test_page_is_linked_where_readers_look_for_it(page: Page, from_file: str) -> None:
     assert page.name.removeprefix("docs/") in (ROOT / from_file).read_text()
+
+
+@pytest.mark.parametrize("page", sorted((ROOT / "docs/decisions").glob("*.md")), ids=lambda page: page.name)
+def test_the_design_lists_every_decision(page: Path) -> None:
+    """By its anchor: the heading in lower case, with hyphens for spaces and without punctuation."""
+    text = (ROOT / "docs/design.md").read_text()
+    headings = re.findall(r"^## (.+)$", page.read_text(), re.MULTILINE)
+    assert headings
+    anchors = [re.sub(r"[^\w -]", "", one.lower()).replace(" ", "-") for one in headings]
+    assert [one for one in anchors if f"(decisions/{page.name}#{one})" not in text] == []
