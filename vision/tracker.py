@@ -114,7 +114,9 @@ class Tracker:
             tracks, detection, occlusion.with_occlusion(grid, labels, measured), self._config.depth_noise
         )
         rims = self._rims.velocities(grid, labels, tracks, pose, detection.captured_ns)
-        nearing = self._nearing(detection, labels)
+        nearing = approach.measure(
+            grid, labels, tracks, self._free, pose, detection.captured_ns, self._config.depth_noise
+        )
         if detection.dt_s > 0:
             rim_motion.fuse(tracks, rims, detection.dt_s)
             approach.fuse(tracks, nearing, pose.translation_m, detection.dt_s)
@@ -128,20 +130,6 @@ class Tracker:
             self._measure_velocities(detection, owner, velocities, arrivals, measured.cells, rims, nearing)
         self._surfaces = masks.surfaces(grid, labels, tracks.ids, pose)
         return owner
-
-    def _nearing(self, detection: Detection, labels: IntGrid) -> approach.Approach:
-        """Speeds towards the camera of tracks that are not known to move, with the cells labels (h, w)."""
-        asked, noise = ~self._tracks.moving, self._config.depth_noise
-        return approach.measure(
-            detection.grid,
-            labels,
-            self._tracks,
-            asked,
-            self._free,
-            detection.pose,
-            detection.captured_ns,
-            noise,
-        )
 
     def _label(
         self,

@@ -225,7 +225,6 @@ def any_evidence(seed: int, count: int, trusted: bool) -> MotionEvidence:
         rim_sigmas=rng.uniform(0.0, 6.0, count),
         rim_s=rng.uniform(0.0, 0.3, count),
         approach_mps=rng.uniform(0.0, 2.0, count),
-        approach_sigmas=rng.uniform(0.0, 6.0, count),
         approach_s=rng.uniform(0.0, 0.3, count),
         view_radps=rng.uniform(0.0, 1.0, count),
         growth_mps=rng.uniform(0.0, 1.0, count),

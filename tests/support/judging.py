@@ -57,7 +57,6 @@ def one(velocity: Speed = STILL, **changes: Any) -> MotionEvidence:
         rim_sigmas=np.array([0.0]),
         rim_s=np.array([0.0]),
         approach_mps=np.array([0.0]),
-        approach_sigmas=np.array([0.0]),
         approach_s=np.array([0.0]),
         view_radps=np.array([0.0]),
         growth_mps=np.array([0.0]),

@@ -26,7 +26,7 @@ from config.perception import DepthNoise
 from hal.compiled import compiled, inlined
 from hal.types import FloatArray, Pose, Vector
 from vision.bodies.arrivals import CELL_NOISE_OVER_TIME, View, ViewMemory
-from vision.bodies.proof_rules import EVEN_CELLS
+from vision.bodies.proof_rules import EVEN_CELLS, LARGEST_M
 from vision.bodies.tracks import Tracks
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import DepthGrid, FloatGrid
@@ -53,7 +53,7 @@ _UNKNOWN_MPS = 100.0  # sigma in the directions that are not measured
 class Approach(NamedTuple):
     """Speeds of T tracks towards the camera, 0 or more, by the depth of their surfaces; m/s.
 
-    mps: (T,); 0 where it is not measured, or not towards the camera.
+    mps: (T,); 0 where it is not measured.
     sigma_mps: its standard deviation, (T,); inf where it is not measured.
     lag_s: time over which it is measured; 0 where there is no view of that time.
     """
@@ -73,20 +73,28 @@ def measure(
     grid: DepthGrid,
     labels: IntGrid,
     tracks: Tracks,
-    asked: NDArray[np.bool_],
     memory: ViewMemory,
     pose: Pose,
     now_ns: int,
     noise: DepthNoise,
 ) -> Approach:
-    """Measure the tracks asked (T,) with the cells labels (h, w), track index + 1. pose: of the camera."""
-    count = len(tracks)
-    then = [memory.view_of(now_ns, wanted_s) for wanted_s in _LOOK_BACK_S]
-    if then[0] is None or then[1] is None or not asked.any():
-        return Approach(np.zeros(count), np.full(count, np.inf), 0.0)
-    longer, shorter = (_since(view, grid, labels, asked, pose, now_ns, noise) for view in then if view)
+    """Measure the tracks with the cells labels (h, w), track index + 1.
+
+    Only those that clearly come nearer count as measured. pose: of the camera.
+    """
+    nothing = Approach(np.zeros(len(tracks)), np.full(len(tracks), np.inf), 0.0)
+    before, lately = (memory.view_of(now_ns, wanted_s) for wanted_s in _LOOK_BACK_S)
+    asked = (tracks.extent_m.max(axis=1) <= LARGEST_M) & (tracks.cells >= EVEN_CELLS)
+    cells = np.where(asked, tracks.cells, 0)
+    if before is None or lately is None or not cells.any():
+        return nothing
+    longer = _since(before, grid, labels, cells, pose, now_ns, noise)
+    clear = longer.sigmas > _CLEAR_SIGMAS
+    if not clear.any():
+        return nothing
+    shorter = _since(lately, grid, labels, np.where(clear, cells, 0), pose, now_ns, noise)
     jumped = shorter.mps > _STEADY * longer.mps + shorter.sigma_mps
-    counts = np.isfinite(longer.sigma_mps) & np.isfinite(shorter.sigma_mps) & ~jumped & (longer.mps > 0.0)
+    counts = clear & np.isfinite(shorter.sigma_mps) & ~jumped
     return Approach(
         np.where(counts, longer.mps, 0.0), np.where(counts, longer.sigma_mps, np.inf), longer.lag_s
     )
@@ -96,30 +104,18 @@ def _since(
     then: View,
     grid: DepthGrid,
     labels: IntGrid,
-    asked: NDArray[np.bool_],
+    cells: NDArray[np.intp],
     pose: Pose,
     now_ns: int,
     noise: DepthNoise,
 ) -> Approach:
-    """Measure by comparing with one view; mps is negative for what moves away."""
+    """Measure by comparing with one view; mps is negative for what moves away.
+
+    cells: number of cells of each track, 0 for tracks that are not asked for, (T,).
+    """
     lag_s = (now_ns - then.stamp_ns) * 1e-9
-    mps, sigma_mps = _compared(grid, labels, asked, pose, then.pose, then.inverse, noise, lag_s)
+    mps, sigma_mps = _compared(grid, labels, cells, pose, then.pose, then.inverse, noise, lag_s)
     return Approach(mps, sigma_mps, lag_s)
-
-
-@inlined
-def _cells_of(labels: IntGrid, asked: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """(T,) number of cells of the tracks asked (T,) in labels (h, w); 0 where they are too few to compare."""
-    cells = np.zeros(len(asked), np.int64)
-    for i in range(labels.shape[0]):
-        for j in range(labels.shape[1]):
-            t = labels[i, j] - 1
-            if t >= 0 and asked[t]:
-                cells[t] += 1
-    for t in range(len(cells)):
-        if cells[t] < EVEN_CELLS:
-            cells[t] = 0
-    return cells
 
 
 @inlined
@@ -153,11 +149,11 @@ def _nearer_m(
     return (1.0 / inverse - there_m if inverse > 0.0 else math.nan), float(there_m)
 
 
-@compiled(DepthGrid, "int32[:, ::1], boolean[::1]", Pose, Pose, "float32[:, ::1]", DepthNoise, "float64")
+@compiled(DepthGrid, "int32[:, ::1], int64[::1]", Pose, Pose, "float32[:, ::1]", DepthNoise, "float64")
 def _compared(
     grid: DepthGrid,
     labels: IntGrid,
-    asked: NDArray[np.bool_],
+    cells: NDArray[np.intp],
     pose: Pose,
     old_pose: Pose,
     seen: FloatGrid,
@@ -166,11 +162,10 @@ def _compared(
 ) -> tuple[FloatArray, FloatArray]:
     """(T,) mps and sigma_mps of Approach, mps negative for what moves away.
 
-    seen (h, w): 1/m, from old_pose, lag_s ago; 0 where not measured.
+    cells (T,): as _since. seen (h, w): 1/m, from old_pose, lag_s ago; 0 where not measured.
     """
     height, width = labels.shape
     rows = relative_row(old_pose, pose, 0), relative_row(old_pose, pose, 1), relative_row(old_pose, pose, 2)
-    cells = _cells_of(labels, asked)
     # The displacements of all tracks one after the other, those of track t from first[t] on.
     first = np.cumsum(cells) - cells
     nearer_m, depth_m = np.empty(cells.sum()), np.zeros(len(cells))
@@ -178,7 +173,7 @@ def _compared(
     for i in range(height):
         for j in range(width):
             t = labels[i, j] - 1
-            if t < 0 or cells[t] == 0:
+            if t < 0 or found[t] >= cells[t]:
                 continue
             by_m, there_m = _nearer_m(grid, i, j, rows, seen)
             slack_m = _SIGMAS * _cell_sigma_m(there_m, noise)
@@ -205,9 +200,10 @@ def _compared(
 def fuse(tracks: Tracks, approach: Approach, camera_m: FloatArray, dt_s: float) -> None:
     """Update both filters of the tracks with their speeds towards a camera at camera_m (3,).
 
-    dt_s: since the frame before.
+    Not of those that are known to move: while they cross, what is behind them was seen in their place. dt_s:
+    since the frame before.
     """
-    use = np.isfinite(approach.sigma_mps).nonzero()[0]
+    use = (np.isfinite(approach.sigma_mps) & ~tracks.moving).nonzero()[0]
     if len(use) == 0:
         return
     sight, _ = tracks.sight(camera_m)
@@ -221,4 +217,4 @@ def fuse(tracks: Tracks, approach: Approach, camera_m: FloatArray, dt_s: float) 
 
 def approaching_s(so_far_s: FloatArray, approach: Approach, dt_s: float) -> FloatArray:
     """(T,) for how long surfaces have clearly come nearer without a break, after a further frame of dt_s."""
-    return np.where(approach.sigmas > _CLEAR_SIGMAS, so_far_s + dt_s, 0.0)
+    return np.where(approach.mps > 0.0, so_far_s + dt_s, 0.0)

@@ -50,8 +50,7 @@ class MotionEvidence:
     rim_sigmas: how many standard deviations rim_mps is from zero.
     rim_s: for how long they have shown motion without a break.
     approach_mps: speed towards the camera by the depth of the surface, 0 where it shows none.
-    approach_sigmas: how many standard deviations approach_mps is from zero.
-    approach_s: for how long it has been clear without a break.
+    approach_s: for how long it has been shown without a break.
     view_radps: how fast the viewing direction changes.
     growth_mps: speed of the centre that a growing or shrinking visible part can explain.
     advances: the centre really advances about as fast as the velocity says.
@@ -84,7 +83,6 @@ class MotionEvidence:
     rim_sigmas: Vector
     rim_s: Vector
     approach_mps: Vector
-    approach_sigmas: Vector
     approach_s: Vector
     view_radps: Vector
     growth_mps: Vector
@@ -137,7 +135,6 @@ def evidence_of(
         rim_sigmas=rims.sigmas,
         rim_s=np.abs(tracks.rim_s),
         approach_mps=approach.mps,
-        approach_sigmas=approach.sigmas,
         approach_s=tracks.approach_s,
         growth_mps=tracks.growth_mps,
         up=sightings.floor_normal(detection),

@@ -18,6 +18,7 @@ from vision.bodies.motion_evidence import MotionEvidence
 from vision.bodies.proof_rules import (
     ENDS_ACROSS,
     EVEN_CELLS,
+    LARGEST_M,
     STANDING_SHARE,
     Ends,
     Opinion,
@@ -46,7 +47,6 @@ _SPEED_PER_METRE = 0.02  # m/s more minimum speed per metre of distance, since a
 _ALONE_MPS = 0.1
 _KNOWN_SPEED = 2.0  # times the minimum speed: if sigma is less, a mover below the minimum has stopped
 _WANDER = 0.5  # of its size: as the view turns from front to side, the centre moves by half a width
-_LARGEST_M = 3.0  # wider parts are walls and racks; movers in front of them are carved out
 # Velocities: filtered; of this frame's fragments; of the surface; the difference of first and third.
 _FILTERED, _FRAME, _SURFACE, _APART = range(4)
 
@@ -145,14 +145,14 @@ def _proofs(
             wander_mps=turning_mps,
         )
         arrival = arrival_of(seen.arrived[t], seen.arriving_s[t], cells, dt_s)
-        possible = filtered.speed_mps <= fastest_mps and size_m <= _LARGEST_M
+        possible = filtered.speed_mps <= fastest_mps and size_m <= LARGEST_M
         fast = filtered.speed_mps > least_mps[t]
         evident = (
             by_fragments(filtered, frame, opinion, track_ends, threshold)
             or by_unrest(filtered, track_ends, threshold)
             or by_arrival(filtered, arrival.some, threshold)
             or by_surface(centre, surface, least_mps[t], dt_s, threshold)
-            or by_approach(seen.approach_mps[t], seen.approach_s[t], least_mps[t], dt_s)
+            or by_approach(seen.approach_mps[t], seen.approach_s[t], least_mps[t] + turning_mps, dt_s)
             or (by_rim(rim, filtered, size_m, least_mps[t], dt_s, threshold) and rim.speed_mps <= fastest_mps)
         )
         # The place where a mover has stopped was free a moment ago, so its arrival there is no proof.

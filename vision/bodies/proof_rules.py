@@ -30,6 +30,7 @@ _CLEAR_WAY = 4.0  # times the depth noise of one pixel: shared noise never shows
 _LASTING_APPROACH_S = 0.12
 _MEASURED_FRAMES = 2.5  # frame intervals: at least three frames at a low frame rate
 EVEN_CELLS = 48  # fewer cells lie on 2 or 3 patches of depth noise, and move back and forth with them
+LARGEST_M = 3.0  # wider parts are walls and racks; movers in front of them are carved out
 _COMPACT_M = 2.2  # a tall person; larger things are seen in part only, and their centre wanders
 
 
@@ -207,7 +208,11 @@ def by_rim(
 
 @inlined
 def by_approach(approach_mps: float, shown_s: float, least_mps: float, dt_s: float) -> bool:
-    """Whether the surface has come nearer for too long to be chance, at approach_mps."""
+    """Whether the surface has come nearer for too long to be chance, at approach_mps.
+
+    least_mps: more where the viewpoint changes: an error of the camera's own turn moves a static surface that
+    is seen aslant.
+    """
     return shown_s >= max(_LASTING_APPROACH_S, _MEASURED_FRAMES * dt_s) and approach_mps > least_mps
 
 
