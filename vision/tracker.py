@@ -105,18 +105,16 @@ class Tracker:
         elapsed_s: float,
     ) -> NDArray[np.int64]:
         """Update surfaces first, then velocities, then the verdict. Returns the track id of each fragment."""
-        tracks, grid, pose = self._tracks, detection.grid, detection.pose
-        changes = self._free.changes(grid, above_floor, pose, detection.captured_ns)
+        tracks, grid, pose, now_ns = self._tracks, detection.grid, detection.pose, detection.captured_ns
+        noise = self._config.depth_noise
+        changes = self._free.changes(grid, above_floor, pose, now_ns)
         if detection.motion_known or detection.restarted:
-            self._free.remember(grid, pose, detection.captured_ns)
+            self._free.remember(grid, pose, now_ns)
         labels, whole, measured = self._label(detection, above_floor, changes, velocities, elapsed_s)
-        sightings.update_from_surfaces(
-            tracks, detection, occlusion.with_occlusion(grid, labels, measured), self._config.depth_noise
-        )
-        rims = self._rims.velocities(grid, labels, tracks, pose, detection.captured_ns)
-        nearing = approach.measure(
-            grid, labels, tracks, self._free, pose, detection.captured_ns, self._config.depth_noise
-        )
+        visible = occlusion.with_occlusion(grid, labels, measured)
+        sightings.update_from_surfaces(tracks, detection, visible, noise)
+        rims = self._rims.velocities(grid, labels, tracks, pose, now_ns)
+        nearing = approach.measure(grid, labels, tracks, self._free, pose, now_ns, noise)
         if detection.dt_s > 0:
             rim_motion.fuse(tracks, rims, detection.dt_s)
             approach.fuse(tracks, nearing, pose.translation_m, detection.dt_s)
@@ -124,7 +122,7 @@ class Tracker:
         sightings.forget_implausible(tracks, IMPLAUSIBLE_SPEED_FACTOR * max_mps, max_mps)
         if tracks.overhead.any():
             tracks.overhead &= ~births.reaching_down(grid, whole, len(tracks), self._body_height_m)
-        owner = adopt(tracks, detection, whole, owner, self._config.depth_noise)
+        owner = adopt(tracks, detection, whole, owner, noise)
         arrivals = masks.count_cells(whole, changes.arrived_cells, len(tracks))
         if detection.dt_s > 0 and len(tracks):
             self._measure_velocities(detection, owner, velocities, arrivals, measured.cells, rims, nearing)
@@ -225,7 +223,7 @@ class Tracker:
         nearing: approach.Approach,
     ) -> None:
         """One weighted least squares per body, fused into its filter; then the verdict."""
-        tracks, settings = self._tracks, self._config.motion
+        tracks, settings, depth_noise = self._tracks, self._config.motion, self._config.depth_noise
         rotation = detection.pose.rotation
         index = tracks.index_of(owner)
         tracks.fragments = np.bincount(index + 1, minlength=len(tracks) + 1)[1:]
@@ -256,9 +254,7 @@ class Tracker:
         tracks.approach_s = approach.approaching_s(tracks.approach_s, nearing, detection.dt_s)
         tracks.rim_s = rim_motion.one_way_s(tracks.rim_s, rims, settings.sigmas, detection.dt_s)
         advances = tracks.update_trailing_average(detection.dt_s)
-        seen = evidence_of(
-            tracks, detection, body, advances, arrivals, cells, rims, nearing, self._config.depth_noise
-        )
+        seen = evidence_of(tracks, detection, body, advances, arrivals, cells, rims, nearing, depth_noise)
         verdict = judge(seen, tracks.evidence, tracks.moving, detection.dt_s, settings)
         tracks.evidence, tracks.moving = verdict.evidence, verdict.moving
         tracks.confidence, tracks.surely_static = verdict.confidence, verdict.surely_static
