@@ -36,6 +36,7 @@ _LANES = 5  # points across the width of a cell
 _MAX_ABOVE_M = 3.0
 # Bodies explain a surface that was on no body before if they cover this share of its width.
 _EXPLAINED_SHARE = 0.8
+_BESIDE_MOVER_M = 1.0  # as close to a mover a surface may be a part of it, such as the rest of a vehicle
 # Surfaces are looked for this much farther along the path than the range of sight.
 _BEYOND_RANGE_M = 2.0
 
@@ -104,9 +105,12 @@ class Sight:
         self.corners.look(on_path, stands, 2.0 * free.half_width_tan, s_m + self._corridor.front_m)
         if nearest_s < math.inf:
             self.surface_clearance_m = clearance_m
+        unexplained = in_corridor[on_path.bands] & ~belongs.any(axis=1)
+        nearest = unexplained & (on_path.s_m <= nearest_s + SAME_SURFACE_M)
         explained_s = self._explained(on_path, in_corridor, np.asarray(belongs.any(axis=1)), nearest_s)
         blind_s_m = s_m + self._mount.forward_m + self._out_of_view_within_m
-        self._surface.note(nearest_s, s_m, blind_s_m, captured_ns, standing, explained_s)
+        beside_mover = _beside_mover(surfaces.points_m[nearest], explained_by)
+        self._surface.note(nearest_s, s_m, blind_s_m, captured_ns, standing, explained_s, beside_mover)
         self._note_floor(free, pose, s_m, captured_ns, in_corridor)
 
     def _explained(
@@ -193,6 +197,14 @@ class Sight:
         half = self._corridor.half_width(cells)[:, None]
         lanes = np.linspace(-1.0, 1.0, _LANES)
         return np.stack((x - np.sin(heading) * half * lanes, y + np.cos(heading) * half * lanes))
+
+
+def _beside_mover(points_m: FloatArray, bodies: Bodies) -> bool:
+    """Whether one of the points (P, 2) is close to a body that moves."""
+    if not len(points_m) or not np.count_nonzero(bodies.moving):
+        return False
+    reach_m = np.full(len(points_m), _BESIDE_MOVER_M)
+    return bool(bodies.select(bodies.moving).covers(points_m, reach_m, _BESIDE_MOVER_M).any())
 
 
 @compiled(SurfacesOnPath, "float64[:], boolean[:, :], boolean[:], float64, float64, int64")

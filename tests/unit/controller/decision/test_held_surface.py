@@ -36,11 +36,23 @@ class Drive:
             self._note(nearest_s_m, standing=True)
         return self.held.s_m
 
-    def _note(self, nearest_s_m: float, standing: bool, explained_s_m: float = math.inf) -> None:
+    def on_beside_mover(self, nearest_s_m: float, frames: int) -> float:
+        for _ in range(frames):
+            self.s_m += 0.04
+            self._note(nearest_s_m, standing=False, beside_mover=True)
+        return self.held.s_m
+
+    def _note(
+        self,
+        nearest_s_m: float,
+        standing: bool,
+        explained_s_m: float = math.inf,
+        beside_mover: bool = False,
+    ) -> None:
         self.frame += 1
         blind_s_m = self.s_m + BLIND_M
         now_ns = self.frame * FRAME_NS
-        self.held.note(nearest_s_m, self.s_m, blind_s_m, now_ns, standing, explained_s_m)
+        self.held.note(nearest_s_m, self.s_m, blind_s_m, now_ns, standing, explained_s_m, beside_mover)
 
 
 def seen_until_below_the_view(frames_before: int) -> Drive:
@@ -72,6 +84,22 @@ def test_one_that_belongs_to_a_body_now_has_not_left_the_view() -> None:
     assert drive.on_explained(2.45, 30) == math.inf
     assert drive.on(math.inf, 5) == math.inf
     assert drive.rest(math.inf) == math.inf
+
+
+def test_one_beside_a_mover_may_be_a_part_of_it_and_is_not_held_at_rest() -> None:
+    """The rest of a vehicle that crosses right before the robot, which no box covers."""
+    drive = Drive()
+    drive.on_beside_mover(2.4, 28)
+    assert drive.on(math.inf, 5) == pytest.approx(2.4)
+    assert drive.rest(math.inf) == math.inf
+
+
+def test_one_that_was_there_before_a_mover_passed_it_is_held_at_rest() -> None:
+    drive = Drive()
+    drive.on(2.4, 20)
+    drive.on_beside_mover(2.4, 10)
+    drive.on(math.inf, 5)
+    assert drive.rest(math.inf, 300) == pytest.approx(2.4)
 
 
 def test_a_body_elsewhere_explains_nothing() -> None:

@@ -163,28 +163,6 @@ def test_a_held_surface_that_is_seen_while_the_robot_stands_and_then_goes_has_go
     assert watch.look(free(), s_m=2.6, times=5, standing=True).surface_s_m == math.inf
 
 
-def before_a_truck(half_across_m: float) -> Watch:
-    """Its flank, 1.6 m ahead of the camera, is first on no body and then on one of this width; it drives off
-    while the robot still rolls."""
-    watch = Watch()
-    for step in range(45):
-        s_m = 2.0 + 0.01 * step
-        flank = box(4.2, 0.0, vy_mps=1.5, half_across_m=half_across_m) if step >= 30 else None
-        watch.look(free(4.0 - s_m - 0.4 if step < 40 else math.inf), s_m=s_m, explained=flank)
-    return watch
-
-
-def test_a_flank_that_belongs_to_a_body_when_it_leaves_is_not_held() -> None:
-    watch = before_a_truck(half_across_m=0.8)
-    assert watch.look(free(), s_m=2.45, times=30, standing=True).surface_s_m == math.inf
-
-
-def test_a_body_that_covers_only_a_part_of_a_surface_does_not_explain_it() -> None:
-    """Somebody walks by before a sill that sinks below the view."""
-    watch = before_a_truck(half_across_m=0.1)
-    assert watch.look(free(), s_m=2.45, times=30, standing=True).surface_s_m == pytest.approx(4.0, abs=0.05)
-
-
 def test_a_sill_is_forgotten_once_the_robot_is_past_it() -> None:
     assert to_rest_before_a_sill().look(free(), s_m=3.5).surface_s_m == math.inf
 
