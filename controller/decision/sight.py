@@ -105,28 +105,26 @@ class Sight:
         self.corners.look(on_path, stands, 2.0 * free.half_width_tan, s_m + self._corridor.front_m)
         if nearest_s < math.inf:
             self.surface_clearance_m = clearance_m
-        unexplained = in_corridor[on_path.bands] & ~belongs.any(axis=1)
-        nearest = unexplained & (on_path.s_m <= nearest_s + SAME_SURFACE_M)
-        explained_s = self._explained(on_path, in_corridor, np.asarray(belongs.any(axis=1)), nearest_s)
+        counts, explained = in_corridor[on_path.bands], belongs.any(axis=1)
+        nearest = counts & ~explained & (on_path.s_m <= nearest_s + SAME_SURFACE_M)
+        explained_s = self._explained(on_path, counts & explained, nearest)
         blind_s_m = s_m + self._mount.forward_m + self._out_of_view_within_m
         beside_mover = _beside_mover(surfaces.points_m[nearest], explained_by)
         self._surface.note(nearest_s, s_m, blind_s_m, captured_ns, standing, explained_s, beside_mover)
         self._note_floor(free, pose, s_m, captured_ns, in_corridor)
 
-    def _explained(
-        self, on_path: SurfacesOnPath, in_corridor: BoolArray, explained: BoolArray, nearest_s: float
-    ) -> float:
+    def _explained(self, on_path: SurfacesOnPath, explained: BoolArray, nearest: BoolArray) -> float:
         """Path coordinate of the surface in the corridor that bodies explain, where the nearest unexplained
         one was last seen across the path; inf: they cover too little of it.
 
-        explained (P,): which surfaces belong to bodies. nearest_s: of the nearest unexplained one.
+        explained, nearest (P,): which surfaces in the corridor belong to bodies, and which are the nearest
+        ones of the others.
         """
-        counts = in_corridor[on_path.bands]
-        if nearest_s < math.inf:
-            there = counts & ~explained & (on_path.s_m <= nearest_s + SAME_SURFACE_M)
-            self._surface_d_m = float(on_path.d_m[there].min()), float(on_path.d_m[there].max())
+        if nearest.any():
+            across_m = on_path.d_m[nearest]
+            self._surface_d_m = float(across_m.min()), float(across_m.max())
         low, high = self._surface_d_m
-        counts = counts & explained & (on_path.d_m >= low) & (on_path.d_m <= high)
+        counts = explained & (on_path.d_m >= low) & (on_path.d_m <= high)
         if not counts.any() or np.ptp(on_path.d_m[counts]) < _EXPLAINED_SHARE * (high - low):
             return math.inf
         return float(on_path.s_m[counts].min())
