@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from hal.types import Intrinsics, Pose
 from vision.camera.health import worsened
 from vision.depth.depth_grid import DepthGrid
+from vision.ego_motion.camera_motion import CameraEstimate
+from vision.ego_motion.motion_prior import MotionPrior
 from vision.motion.velocities import EndResiduals
 from vision.scene import CameraCondition, CameraHealth, EgoMotion, SeenFloor
 
@@ -99,6 +101,19 @@ def camera_health(health: CameraHealth, ego: EgoMotion, blurred: bool, reckoned:
         return worsened(health, CameraCondition.DEGRADED, reason)
     reason = "the camera's motion is not known: too few static fragments agree, and there is no odometry"
     return worsened(health, CameraCondition.UNTRUSTWORTHY, reason)
+
+
+def ego_motion_of(found: CameraEstimate, step: Pose, dt_s: float, prior: MotionPrior) -> EgoMotion:
+    """The EgoMotion of an estimate. step: the camera's motion in dt_s."""
+    variance = found.covariance.diagonal()
+    return EgoMotion(
+        motion=step,
+        dt_s=dt_s,
+        source="visual" if found.visual else "disputed" if found.disputed else prior.source,
+        inlier_ratio=found.inlier_ratio,
+        sigma_translation_m=float(np.sqrt(variance[3:].sum())),
+        sigma_rotation_rad=float(np.sqrt(variance[:3].sum())),
+    )
 
 
 def no_motion(count: int) -> EndResiduals:

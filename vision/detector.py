@@ -22,8 +22,9 @@ from vision.camera.lens import vector_from_rotation
 from vision.camera.mount_check import MountCheck
 from vision.depth.depth_grid import DepthGrid, make_grid
 from vision.depth.depth_mask import surface_depth
-from vision.detection import MOTION_NOT_KNOWN, Detection, camera_health, no_motion
+from vision.detection import MOTION_NOT_KNOWN, Detection, camera_health, ego_motion_of, no_motion
 from vision.ego_motion.camera_motion import MIN_AGREEMENT, CameraEstimate, estimate
+from vision.ego_motion.lone_body import bodies_px
 from vision.ego_motion.motion_memory import MotionMemory
 from vision.ego_motion.motion_prior import MotionPrior
 from vision.ego_motion.rolling_shutter import ReadOut
@@ -116,12 +117,14 @@ class Detector:
         depths = depths_with_sigma(anchor, config.depth_noise)
         static = static_points(anchor, depths, store.pixel_cov, excluded, config.max_depth_m)
         pixels = store.ends_px.reshape(-1, 2).astype(float)
-        found = estimate(static, pixels, self._pose, prior, self._read_out.sweep(), frame.intrinsics)
+        boxes_px = bodies_px(previous.scene.obstacles if previous else ())
+        sweep = self._read_out.sweep()
+        found = estimate(static, pixels, self._pose, prior, sweep, frame.intrinsics, boxes_px)
         motion = self._measure_residuals(frame, anchor, depths, found, excluded)
         step = self._pose.inverse() @ found.pose
         self._read_out.learn(found, vector_from_rotation(step.rotation), dt_s)
         self._pose = found.pose
-        ego, reckoned = _ego(step, dt_s, found, prior), prior.source != "none"
+        ego, reckoned = ego_motion_of(found, step, dt_s, prior), prior.source != "none"
         self._memory.learn(step, dt_s, ego.source)
         blurred = found.visual and not reckoned and found.inlier_ratio < MIN_AGREEMENT
         detection = self._detection(
@@ -209,6 +212,7 @@ class Detector:
         return grid
 
     def _renew(self, frame: RgbdFrame, grey: GreyImage) -> None:
+        self._store.keep(~self._renewal.crowded(self._store.ends_px, grey.shape))
         without_depth = int(np.count_nonzero(np.isnan(self._store.near_m).all(axis=1)))
         new = self._renewal.find(frame, grey, self._store.ends_px, without_depth)
         self._store.add(new.ends_px, new.near_m, new.far_m, new.pixel_cov)
@@ -285,15 +289,3 @@ class Detector:
             blurred=blurred,
             floor=self._mount_check.floor,
         )
-
-
-def _ego(step: Pose, dt_s: float, result: CameraEstimate, prior: MotionPrior) -> EgoMotion:
-    variance = result.covariance.diagonal()
-    return EgoMotion(
-        motion=step,
-        dt_s=dt_s,
-        source="visual" if result.visual else "disputed" if result.disputed else prior.source,
-        inlier_ratio=result.inlier_ratio,
-        sigma_translation_m=float(np.sqrt(variance[3:].sum())),
-        sigma_rotation_rad=float(np.sqrt(variance[:3].sum())),
-    )

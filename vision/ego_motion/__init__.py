@@ -8,6 +8,7 @@ Files, in the order in which they come into play:
 * reprojection - anchored points, and where they are seen now.
 * pose_arrays - poses as arrays, moved and compared in compiled steps.
 * robust_fit - robust Gauss-Newton on the reprojection error.
+* lone_body - whether one body alone tells how the camera turns.
 * camera_motion - the estimate: gates, the conflict with the prior, the covariance.
 * rolling_shutter - correction of pixels for the sweep; learns the read-out time.
 """

@@ -20,6 +20,8 @@ Conflict with a trusted prior (from odometry, or from the kinematics of a tracke
   as disputed: the robot's tracks may slip, or everything in view may move. Points of fragments that seemed
   to move have no vote for that motion, but count against it if they are where the prior expects them. A
   vehicle that filled the view was taken for static in the frames before; then what is static seems to move.
+* If one body alone tells that motion, it has no say: it may move itself (vision/ego_motion/lone_body.py).
+  This holds for odometry, and also for a turn that differs from it by more than slip explains.
 * Otherwise the fit is repeated with a tighter prior. If the result still contradicts it, or too few points
   agree, the prior alone is the answer.
 
@@ -36,6 +38,7 @@ import cv2
 import numpy as np
 
 from hal.types import FloatArray, Intrinsics, Pose
+from vision.ego_motion.lone_body import without_lone_body
 from vision.ego_motion.motion_prior import MotionPrior, SweepPrior
 from vision.ego_motion.reprojection import Anchors, View, view_of
 from vision.ego_motion.robust_fit import Fit, fit, misfits
@@ -55,6 +58,8 @@ _BENT_CHI2 = 16.0  # four sigmas: the image alone shows another sweep than the f
 # Sigmas of more than twice the assumed ones are not noise: something is wrong, such as depth that does not
 # lie where the colour is.
 _MAX_NOISE_SCALE = 4.0
+_CERTAIN_CHI2 = 9.0  # three sigmas
+_NO_BODIES = np.empty((0, 4))
 _STRAIGHTENED_SHARE = 0.05  # of the points: minimum of additional inliers to accept the larger sweep
 
 
@@ -109,6 +114,16 @@ class _Points:
         return fit(view_of(self.anchors, self.pixels, left_out, self.camera), start, sigma).inliers
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Fitted:
+    """A fit to the points of view; the sigma (8,) of its prior; its _bend."""
+
+    view: View
+    fit: Fit
+    sigma: FloatArray
+    bend: tuple[FloatArray, FloatArray]
+
+
 def estimate(
     anchors: Anchors,
     pixels: FloatArray,
@@ -116,42 +131,40 @@ def estimate(
     prior: MotionPrior,
     sweep: SweepPrior,
     camera: Intrinsics,
+    boxes_px: FloatArray = _NO_BODIES,
 ) -> CameraEstimate:
     """The camera now, from where anchored points are seen now, pixels (N, 2).
 
-    before: pose of the camera in the frame before, in the fixed frame. sweep: prior of the sweep.
+    before: pose of the camera in the frame before, in the fixed frame. sweep: prior of the sweep. boxes_px
+    (B, 4): bounding boxes (u0, v0, u1, v1) of what may move as a whole.
     """
     start, points = before @ prior.motion, _Points(anchors, pixels, camera)
-    view = points.usable()
-    if len(view.seen) < _MIN_POINTS:
+    first = _fit_with_sweep(points.usable(), start, prior, sweep)
+    if first is not None and prior.source == "odometry" and _implausible(first.fit, prior):
+        others = without_lone_body(first.view, start, boxes_px, camera)
+        if len(others.seen) < len(first.view.seen):
+            first = _fit_with_sweep(others, start, prior, sweep)
+    if first is None:
         return _prior_only(start, np.concatenate((prior.sigma, sweep.sigma_rad)), float("nan"))
-    first, sigma, bend = _fit_with_sweep(view, start, prior, sweep)
-    found = _checked(points, view, start, prior, first, sigma, bend)
+    found = _checked(points, first, start, prior)
     if prior.source != "none" or found.disputed or found.inlier_ratio >= MIN_AGREEMENT:
         return found
-    scale = _noise_scale(view, first)
-    noisier = view.with_pixel_variance(scale)
-    again = _checked(points, noisier, start, prior, *_fit_with_sweep(noisier, start, prior, sweep))
+    scale = _noise_scale(first)
+    noisier = _fit_with_sweep(first.view.with_pixel_variance(scale), start, prior, sweep) or first
+    again = _checked(points, noisier, start, prior)
     if again.visual and again.inlier_ratio >= MIN_AGREEMENT:
         return replace(again, inlier_ratio=found.inlier_ratio, noise_scale=scale)
     return found
 
 
-def _noise_scale(view: View, found: Fit) -> float:
+def _noise_scale(first: _Fitted) -> float:
     """Variance of the pixels in this frame, as a ratio to the assumed one, from 1 to _MAX_NOISE_SCALE."""
-    return min(max(variance_ratio(misfits(view, found)), 1.0), _MAX_NOISE_SCALE)
+    return min(max(variance_ratio(misfits(first.view, first.fit)), 1.0), _MAX_NOISE_SCALE)
 
 
-def _checked(
-    points: _Points,
-    view: View,
-    start: Pose,
-    prior: MotionPrior,
-    found: Fit,
-    sigma: FloatArray,
-    bend: tuple[FloatArray, FloatArray],
-) -> CameraEstimate:
-    """The estimate from a fit and the sigma of its prior, if it does not contradict a trusted prior."""
+def _checked(points: _Points, fitted: _Fitted, start: Pose, prior: MotionPrior) -> CameraEstimate:
+    """The estimate from a fit, if it does not contradict a trusted prior."""
+    view, found, sigma, bend = fitted.view, fitted.fit, fitted.sigma, fitted.bend
     count = len(view.seen)
     least = max(_MIN_POINTS, _MIN_INLIER_RATIO * count)
     conflicts = prior.trusted and _conflict(found, prior.sigma)
@@ -194,14 +207,24 @@ def _is_unanimous(agree: int, count: int, points: _Points, start: Pose, sigma: F
     return agree >= _UNANIMOUS_RATIO * (count + points.left_out_that_fit(start, sigma))
 
 
-def _fit_with_sweep(
-    view: View, start: Pose, prior: MotionPrior, sweep: SweepPrior
-) -> tuple[Fit, FloatArray, tuple[FloatArray, FloatArray]]:
-    """The fit with the prior of the sweep that explains more, the sigma (8,) of its prior, and its _bend.
+def _implausible(found: Fit, prior: MotionPrior) -> bool:
+    """Whether the camera turns in another way than slip explains, or contradicts its prior as a whole."""
+    beyond_rad = abs(found.back[1]) - prior.slip_rad
+    if beyond_rad > 0.0:
+        regular, covariance = cv2.invert(found.information, flags=cv2.DECOMP_CHOLESKY)
+        if regular and beyond_rad**2 > _CERTAIN_CHI2 * covariance[1, 1]:
+            return True
+    return _conflict(found, prior.sigma)
+
+
+def _fit_with_sweep(view: View, start: Pose, prior: MotionPrior, sweep: SweepPrior) -> _Fitted | None:
+    """The fit with the prior of the sweep that explains more; None if there are too few points.
 
     Before the read-out time is known, the sweep may be larger than its prior admits, which then shows in the
     image.
     """
+    if len(view.seen) < _MIN_POINTS:
+        return None
     sigma = np.concatenate((prior.sigma, sweep.sigma_rad))
     found = fit(view, start, sigma)
     bend = bend_rad, bend_variance = _bend(found)
@@ -209,8 +232,8 @@ def _fit_with_sweep(
         possible = np.concatenate((prior.sigma, sweep.max_rad))
         straightened = fit(view, start, possible)
         if straightened.inliers >= found.inliers + _STRAIGHTENED_SHARE * len(view.seen):
-            return straightened, possible, _bend(straightened)
-    return found, sigma, bend
+            return _Fitted(view, straightened, possible, _bend(straightened))
+    return _Fitted(view, found, sigma, bend)
 
 
 def _prior_only(start: Pose, sigma: FloatArray, inlier_ratio: float) -> CameraEstimate:

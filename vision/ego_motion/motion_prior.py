@@ -22,6 +22,7 @@ from hal.types import CameraMount, FloatArray, Pose
 from vision.camera.lens import rotation_from_vector, vector_from_rotation
 from vision.ego_motion.forward_speed import ForwardSpeed, ahead, down
 
+_STEADY_RADPS = 0.02  # added to what slip explains of a turn: noise of the turn that the images tell
 _SIDEWAYS_MPS = 0.10  # one sigma across the direction of travel: vibration, and slip while turning
 
 
@@ -34,12 +35,14 @@ class MotionPrior:
         along x, y, z, (6,).
     source: "odometry" or "none"; see EgoMotion.
     trusted: so reliable that image data which contradict it must have followed something large that moves.
+    slip_rad: how far the turn about y may differ because tracks slip; inf: by as much as the images tell.
     """
 
     motion: Pose
     sigma: FloatArray
     source: str
     trusted: bool = False
+    slip_rad: float = math.inf
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,10 +61,12 @@ def odometry_prior(motion: Pose, dt_s: float, settings: EgoMotionSettings) -> Mo
     """A prior from dead reckoning: good in translation, subject to slip in yaw, blind to vibration."""
     turn_rad = math.hypot(*vector_from_rotation(motion.rotation).tolist())
     displacement_m = math.hypot(*motion.translation_m.tolist())
-    yaw = settings.odometry_yaw_ratio * turn_rad + settings.odometry_rotation_radps * dt_s
+    slip_rad = settings.odometry_yaw_ratio * turn_rad
+    yaw = slip_rad + settings.odometry_rotation_radps * dt_s
     tilt = settings.vibration_radps * dt_s + 0.1 * turn_rad
     way = settings.odometry_speed_ratio * displacement_m + settings.odometry_speed_mps * dt_s
-    return MotionPrior(motion, np.array([tilt, yaw, tilt, way, way, way]), "odometry", True)
+    sigma = np.array([tilt, yaw, tilt, way, way, way])
+    return MotionPrior(motion, sigma, "odometry", True, slip_rad + _STEADY_RADPS * dt_s)
 
 
 def steady_prior(last: Pose, last_dt_s: float, dt_s: float, settings: EgoMotionSettings) -> MotionPrior:
@@ -117,4 +122,4 @@ def with_gyro(
     sigma = prior.sigma.copy()
     sigma[:3] = settings.gyro_radps * dt_s
     motion = Pose(rotation_from_vector(turn_rad), prior.motion.translation_m)
-    return MotionPrior(motion, sigma, prior.source, prior.trusted)
+    return MotionPrior(motion, sigma, prior.source, prior.trusted, prior.slip_rad)

@@ -28,6 +28,7 @@ _BLOCKS = 2  # per part, one above the other: each has its own threshold of cont
 _MARGIN_PX = 8  # around a part: a segment across its border is found from either side
 _MANY_MISSING = 8  # if more than 1/8 of the fragments are missing, a whole column of parts is searched
 _FEW_MISSING = 16  # if less than 1/16 are missing, none is: a search for one costs as much as for ten
+_CROWDED = 2  # times the number that a tile takes
 _MIN_END_DISTANCE_PX = 12.0  # after the ends were moved to corners: a third of the minimum length
 _CANDIDATES_PER_TILE = 4  # twice what a tile takes, since some have no depth or no corner
 _SHARE_WITHOUT_DEPTH = 0.15  # maximum share of all fragments: these measure only the camera's rotation
@@ -45,6 +46,21 @@ class Renewal:
         self._threshold = np.empty((0, 0, 0))
         self._visits = 0
 
+    def crowded(self, ends_px: NDArray[np.float32], shape: tuple[int, int]) -> NDArray[np.bool_]:
+        """(N,) the newest fragments of crowded tiles, where there is no room for others.
+
+        ends_px (N, 2, 2): in the order of their ids. shape: of the image. Something that filled the view and
+        goes away would otherwise keep all fragments, and none would be left for what comes into view.
+        """
+        settings = self._config.fragments
+        if self._room(len(ends_px)) * _FEW_MISSING >= settings.max_fragments:
+            return np.zeros(len(ends_px), np.bool_)
+        most = _CROWDED * settings.fragments_per_tile
+        return _surplus(np.ascontiguousarray(ends_px), settings.tile_px, *shape, most)
+
+    def _room(self, present: int) -> int:
+        return self._config.fragments.max_fragments - present
+
     def find(
         self, frame: RgbdFrame, grey: GreyImage, ends_px: NDArray[np.float32], without_depth: int
     ) -> NewFragments:
@@ -61,7 +77,7 @@ class Renewal:
             usual = 0.5 * (settings.canny_least + settings.canny_most)
             self._threshold = np.full((rows, columns, _BLOCKS), usual)
             self._last_visit = np.full(rows * columns, -1, np.intp)
-        room = settings.max_fragments - len(ends_px)
+        room = self._room(len(ends_px))
         if room * _FEW_MISSING < settings.max_fragments:
             return NOTHING_NEW
         self._visits += 1
@@ -146,6 +162,21 @@ def _tile_counts(ends_px: NDArray[np.float32], tile_px: int, height: int, width:
         for end in range(2):
             counts[_tile(counts, ends_px[n, end, 0], ends_px[n, end, 1], 1.0 / tile_px)] += 1
     return counts
+
+
+@compiled("float32[:, :, ::1], int64, int64, int64, int64")
+def _surplus(
+    ends_px: NDArray[np.float32], tile_px: int, height: int, width: int, most: int
+) -> NDArray[np.bool_]:
+    """(N,) fragments with their middle in a tile that holds as many as most of those before them."""
+    seen = np.zeros((-(-height // tile_px), -(-width // tile_px)), np.int64)
+    surplus = np.zeros(len(ends_px), np.bool_)
+    for n in range(len(ends_px)):
+        u, v = ends_px[n, 0, 0] + ends_px[n, 1, 0], ends_px[n, 0, 1] + ends_px[n, 1, 1]
+        tile = _tile(seen, u, v, 0.5 / tile_px)
+        surplus[n] = seen[tile] >= most
+        seen[tile] += 1
+    return surplus
 
 
 @compiled("bool_[:, ::1], int64, uint8[:, ::1], int64, int64")

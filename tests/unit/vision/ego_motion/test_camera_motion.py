@@ -147,6 +147,17 @@ def test_a_prior_that_nearly_all_points_contradict_is_disputed(way_m: tuple[floa
     assert found.inlier_ratio > 0.9
 
 
+def test_points_of_seeming_movers_have_no_vote_but_deny_a_dispute() -> None:
+    """A vehicle that filled the view was taken for static; now the racks beside it seem to move."""
+    points = anchors(200)
+    vehicle = share(200, 0.5)
+    moved = points.points_m + np.where(vehicle[:, None], [0.0, 0.0, 0.03], 0.0)
+    racks_left_out = replace(points, usable=vehicle, left_out=~vehicle)
+    for static, disputed in ((racks_left_out, False), (replace(points, usable=vehicle), True)):
+        found = estimate(static, seen(moved, IDENTITY), IDENTITY, odometry(IDENTITY), GLOBAL_SHUTTER, CAMERA)
+        assert found.disputed == disputed
+
+
 def test_points_marked_as_not_usable_have_no_say() -> None:
     static = anchors()
     moving = share(160, 0.8)

@@ -71,20 +71,19 @@ def test_a_disputed_motion_makes_nothing_move(true_mps: float, reckoned_mps: flo
     assert np.median(ways_m) == pytest.approx(true_mps / 30.0, abs=3e-3)
 
 
-def test_a_vehicle_that_filled_the_view_is_not_static_for_long_once_it_drives_off() -> None:
+def test_a_vehicle_that_fills_the_view_and_drives_off_moves_and_not_the_robot() -> None:
     """At first all that the standing robot sees goes away from it, as if it went back itself."""
     crates = box(vector(2.6, 1.0, 0.0), CRATE_M, 10) + box(vector(3.0, -1.2, 0.0), CRATE_M, 20)
     vehicle = box(vector(0.45, 0.0, 0.0), vector(1.0, 0.9, 1.0), 30, vector(0.6, 0.0, 0.0))
     shown = noisy(record(room() + crates + vehicle, drive(0.0), 2 * COUNT, QVGA))
     eyes = perception()
     scenes = [eyes.perceive(frame, shown.cameras[0], None).scene for frame in shown.frames]
-    disputed = [k for k, scene in enumerate(scenes) if scene.ego_motion.source == "disputed"]
-    assert len(disputed) > COUNT / 2, "the vehicle is meant to fill the view"
-    # Without the points of what seemed to move, it takes 20 frames longer.
-    assert max(disputed) < 1.25 * COUNT
+    assert {scene.ego_motion.source for scene in scenes[1:]} == {"visual", "odometry"}
+    for scene in scenes[8:]:
+        (mover,) = [one for one in scene.obstacles if one.moving]
+        assert mover.velocity_mps[2] == pytest.approx(0.6, abs=0.15)
+    # Its fragments leave room for those of what comes into view behind it.
     assert {scene.health.condition for scene in scenes[-COUNT // 2 :]} == {CameraCondition.GOOD}
-    (mover,) = [one for one in scenes[-1].obstacles if one.moving]
-    assert mover.velocity_mps[2] == pytest.approx(0.6, abs=0.1)
 
 
 def test_motion_impossible_for_a_tracked_base_is_disputed_without_blaming_the_odometry() -> None:

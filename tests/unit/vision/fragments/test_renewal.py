@@ -89,6 +89,18 @@ def segments(*middles: tuple[float, float]) -> NDArray[np.float32]:
     return ends
 
 
+def test_where_there_is_no_room_the_newest_of_a_crowded_tile_are_dropped() -> None:
+    """A tile takes two, so four are not yet a crowd."""
+    config = PerceptionConfig(fragments=FragmentSettings(max_fragments=20))
+    crowd, others = segments(*[(60.0, 50.0)] * 9), segments((20.0, 20.0), *[(100.0, 50.0)] * 4)
+    ends = np.concatenate((others, crowd, segments((639.0, 479.0))))
+    dropped = np.array([False] * 9 + [True] * 5 + [False])
+    np.testing.assert_array_equal(Renewal(config).crowded(ends, (480, 640)), False)
+    full = np.concatenate((ends, segments(*[(100.0 + 40.0 * k, 300.0) for k in range(5)])))
+    expected = np.concatenate((dropped, np.zeros(5, np.bool_)))
+    np.testing.assert_array_equal(Renewal(config).crowded(full, (480, 640)), expected)
+
+
 def test_ends_are_counted_by_tile_up_to_the_rim_of_the_image() -> None:
     """130x90 px are four columns and three rows of tiles of 40 px, the last ones cut."""
     ends = np.array([[[0.0, 0.0], [39.9, 39.9]], [[40.0, 39.0], [129.0, 89.0]]], np.float32)

@@ -1,0 +1,129 @@
+"""A body that alone tells the camera's turn has a say only as far as slip explains that turn."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hal.types import FloatArray, Pose
+from tests.unit.vision.ego_motion.test_camera_motion import (
+    CAMERA,
+    DT_S,
+    GLOBAL_SHUTTER,
+    IDENTITY,
+    SETTINGS,
+    anchors,
+    odometry,
+    seen,
+)
+from vision.camera.lens import rotation_from_vector, vector_from_rotation
+from vision.ego_motion.camera_motion import estimate
+from vision.ego_motion.lone_body import bodies_px, without_lone_body
+from vision.ego_motion.motion_prior import MotionPrior, odometry_prior, with_gyro
+from vision.ego_motion.reprojection import Anchors, View, view_of
+from vision.scene import Obstacle
+
+ALONG = np.array([1e5, 0.0, 30.0])  # covariance of a point on a blurred horizontal line, px^2
+CRATE_PX = np.array([[250.0, 120.0, 420.0, 360.0]])
+AHEAD = Pose(np.eye(3), np.array([0.0, 0.0, 0.04]))
+
+
+def plain_room(cornered: float = 0.0) -> tuple[Anchors, np.ndarray]:
+    """Points all over the view, of which only those on the crate, and a share of the others, are corners.
+
+    Also returns which are on the crate.
+    """
+    points = anchors(400)
+    pixels = seen(points.points_m, IDENTITY)
+    u0, v0, u1, v1 = CRATE_PX[0]
+    crate = (pixels[:, 0] > u0) & (pixels[:, 0] < u1) & (pixels[:, 1] > v0) & (pixels[:, 1] < v1)
+    line = ~crate & (np.arange(400) >= cornered * 400)
+    covariance = points.pixel_cov.copy()
+    covariance[line] = ALONG
+    return replace(points, pixel_cov=covariance), crate
+
+
+def yaw_rad(prior: MotionPrior, true: Pose, aside_m: float = 0.0, cornered: float = 0.0) -> float:
+    """Estimated turn about y while the camera moves by true, and the crate by aside_m to the right."""
+    points, crate = plain_room(cornered)
+    moved = points.points_m + np.where(crate[:, None], [aside_m, 0.0, 0.0], 0.0)
+    found = estimate(points, seen(moved, true), IDENTITY, prior, GLOBAL_SHUTTER, CAMERA, CRATE_PX)
+    return float(vector_from_rotation(found.pose.rotation)[1])
+
+
+def turning(rad: float) -> Pose:
+    return Pose(rotation_from_vector(np.array([0.0, rad, 0.0])), AHEAD.translation_m)
+
+
+def test_a_lone_crate_that_moves_does_not_turn_the_camera() -> None:
+    # 0.45 m/s to the right looks like a turn of 0.1 rad/s to the left where the crate is.
+    assert yaw_rad(odometry(AHEAD), AHEAD, aside_m=0.015) == pytest.approx(0.0, abs=1e-5)
+
+
+def test_a_moving_crate_among_many_corners_is_outvoted() -> None:
+    assert yaw_rad(odometry(AHEAD), AHEAD, aside_m=0.015, cornered=0.5) == pytest.approx(0.0, abs=3e-4)
+
+
+@pytest.mark.parametrize("slip", [0.9, 1.1])
+def test_a_lone_crate_corrects_the_odometry_for_slip(slip: float) -> None:
+    found = yaw_rad(odometry(turning(0.015 * slip)), turning(0.015))
+    assert found == pytest.approx(0.015, abs=1e-4)
+
+
+def test_a_turn_beyond_slip_is_not_believed_from_a_lone_crate_but_from_corners_all_over() -> None:
+    prior, true = odometry(turning(0.010)), turning(0.0135)
+    assert yaw_rad(prior, true) == pytest.approx(0.010, abs=1e-3)
+    assert yaw_rad(prior, true, cornered=0.9) == pytest.approx(0.0135, abs=1e-4)
+
+
+def test_without_odometry_the_images_tell_any_turn() -> None:
+    prior = replace(odometry(AHEAD), slip_rad=np.inf, trusted=False, source="none")
+    assert yaw_rad(prior, turning(0.002)) == pytest.approx(0.002, abs=1e-4)
+
+
+def test_slip_explains_a_fifth_of_the_turn_and_some_noise() -> None:
+    assert odometry_prior(turning(0.02), DT_S, SETTINGS).slip_rad == pytest.approx(0.2 * 0.02 + 0.02 * DT_S)
+    turn = np.array([0.0, 0.01, 0.0])
+    prior = odometry_prior(turning(0.02), DT_S, SETTINGS)
+    assert with_gyro(prior, turn, DT_S, SETTINGS).slip_rad == prior.slip_rad
+
+
+def view(points: Anchors) -> View:
+    return view_of(points, seen(points.points_m, AHEAD), points.usable.nonzero()[0], CAMERA)
+
+
+def test_the_points_in_the_box_of_a_lone_body_and_close_around_it_are_left_out() -> None:
+    points, crate = plain_room()
+    kept = without_lone_body(view(points), AHEAD, CRATE_PX, CAMERA)
+    left_out = len(crate) - len(kept.seen)
+    assert crate.sum() <= left_out < 1.4 * crate.sum()
+    whole = view(points)
+    other = np.array([[0.0, 0.0, 100.0, 100.0]])
+    assert without_lone_body(whole, AHEAD, other, CAMERA) is whole
+    assert without_lone_body(whole, AHEAD, np.empty((0, 4)), CAMERA) is whole
+
+
+def test_a_point_of_unknown_depth_tells_no_turn_along_its_epipolar_line() -> None:
+    """Far corners at the height of the horizon, beside the crate: their shift may be due to their depth."""
+    points, crate = plain_room()
+    level = ~crate & (abs(seen(points.points_m, IDENTITY)[:, 1] - CAMERA.cy) < 20.0)
+    covariance = points.pixel_cov.copy()
+    covariance[level] = [0.02, 0.0, 0.02]
+    beside = replace(points, pixel_cov=covariance)
+    forward = Pose(np.eye(3), np.array([0.0, 0.0, 0.5]))
+    assert len(without_lone_body(view(beside), forward, CRATE_PX, CAMERA).seen) == 400
+    unknown = replace(beside, depth_sigma_m=np.where(level, 10.0, beside.depth_sigma_m))
+    assert len(without_lone_body(view(unknown), forward, CRATE_PX, CAMERA).seen) < 400
+
+
+def obstacle(box_px: tuple[float, float, float, float], extent_m: FloatArray) -> Obstacle:
+    return Obstacle(1, box_px, np.ones(3), extent_m, np.zeros(3), np.eye(3), False, 0.5, 0, 1.0, 0.0)
+
+
+def test_walls_and_racks_are_no_bodies() -> None:
+    crate = obstacle((1.0, 2.0, 3.0, 4.0), np.array([1.0, 1.5, 0.5]))
+    rack = obstacle((5.0, 6.0, 7.0, 8.0), np.array([1.0, 2.0, 6.0]))
+    np.testing.assert_array_equal(bodies_px((rack, crate)), [[1.0, 2.0, 3.0, 4.0]])
+    assert bodies_px(()).shape == (0, 4)
