@@ -138,6 +138,8 @@ class Detector:
             reckoned=reckoned,
             blurred=blurred,
         )
+        on_movers = excluded & ~store.body_only
+        store.keep(~self._renewal.crowded(store.ends_px, on_movers, grey.shape))
         # A look at a body takes the place of a renewal, but never twice in a row.
         looked = previous is not None and self._look_closer(frame, grey, previous.needs_fragments)
         self._renewed = not (looked and self._renewed)
@@ -212,7 +214,6 @@ class Detector:
         return grid
 
     def _renew(self, frame: RgbdFrame, grey: GreyImage) -> None:
-        self._store.keep(~self._renewal.crowded(self._store.ends_px, grey.shape))
         without_depth = int(np.count_nonzero(np.isnan(self._store.near_m).all(axis=1)))
         new = self._renewal.find(frame, grey, self._store.ends_px, without_depth)
         self._store.add(new.ends_px, new.near_m, new.far_m, new.pixel_cov)

@@ -28,7 +28,6 @@ _BLOCKS = 2  # per part, one above the other: each has its own threshold of cont
 _MARGIN_PX = 8  # around a part: a segment across its border is found from either side
 _MANY_MISSING = 8  # if more than 1/8 of the fragments are missing, a whole column of parts is searched
 _FEW_MISSING = 16  # if less than 1/16 are missing, none is: a search for one costs as much as for ten
-_CROWDED = 2  # times the number that a tile takes
 _MIN_END_DISTANCE_PX = 12.0  # after the ends were moved to corners: a third of the minimum length
 _CANDIDATES_PER_TILE = 4  # twice what a tile takes, since some have no depth or no corner
 _SHARE_WITHOUT_DEPTH = 0.15  # maximum share of all fragments: these measure only the camera's rotation
@@ -46,8 +45,10 @@ class Renewal:
         self._threshold = np.empty((0, 0, 0))
         self._visits = 0
 
-    def crowded(self, ends_px: NDArray[np.float32], shape: tuple[int, int]) -> NDArray[np.bool_]:
-        """(N,) the newest fragments of crowded tiles, where there is no room for others.
+    def crowded(
+        self, ends_px: NDArray[np.float32], on_movers: NDArray[np.bool_], shape: tuple[int, int]
+    ) -> NDArray[np.bool_]:
+        """(N,) the newest fragments on_movers (N,) of crowded tiles, where there is no room for others.
 
         ends_px (N, 2, 2): in the order of their ids. shape: of the image. Something that filled the view and
         goes away would otherwise keep all fragments, and none would be left for what comes into view.
@@ -55,8 +56,8 @@ class Renewal:
         settings = self._config.fragments
         if self._room(len(ends_px)) * _FEW_MISSING >= settings.max_fragments:
             return np.zeros(len(ends_px), np.bool_)
-        most = _CROWDED * settings.fragments_per_tile
-        return _surplus(np.ascontiguousarray(ends_px), settings.tile_px, *shape, most)
+        per_tile, ends_px = settings.fragments_per_tile, np.ascontiguousarray(ends_px)
+        return _surplus(ends_px, on_movers, settings.tile_px, *shape, per_tile)
 
     def _room(self, present: int) -> int:
         return self._config.fragments.max_fragments - present
@@ -164,17 +165,22 @@ def _tile_counts(ends_px: NDArray[np.float32], tile_px: int, height: int, width:
     return counts
 
 
-@compiled("float32[:, :, ::1], int64, int64, int64, int64")
+@compiled("float32[:, :, ::1], bool_[::1], int64, int64, int64, int64")
 def _surplus(
-    ends_px: NDArray[np.float32], tile_px: int, height: int, width: int, most: int
+    ends_px: NDArray[np.float32],
+    spare: NDArray[np.bool_],
+    tile_px: int,
+    height: int,
+    width: int,
+    per_tile: int,
 ) -> NDArray[np.bool_]:
-    """(N,) fragments with their middle in a tile that holds as many as most of those before them."""
+    """(N,) spare fragments with their middle in a tile that holds per_tile fragments before them."""
     seen = np.zeros((-(-height // tile_px), -(-width // tile_px)), np.int64)
     surplus = np.zeros(len(ends_px), np.bool_)
     for n in range(len(ends_px)):
         u, v = ends_px[n, 0, 0] + ends_px[n, 1, 0], ends_px[n, 0, 1] + ends_px[n, 1, 1]
         tile = _tile(seen, u, v, 0.5 / tile_px)
-        surplus[n] = seen[tile] >= most
+        surplus[n] = spare[n] and seen[tile] >= per_tile
         seen[tile] += 1
     return surplus
 

@@ -89,16 +89,19 @@ def segments(*middles: tuple[float, float]) -> NDArray[np.float32]:
     return ends
 
 
-def test_where_there_is_no_room_the_newest_of_a_crowded_tile_are_dropped() -> None:
-    """A tile takes two, so four are not yet a crowd."""
-    config = PerceptionConfig(fragments=FragmentSettings(max_fragments=20))
-    crowd, others = segments(*[(60.0, 50.0)] * 9), segments((20.0, 20.0), *[(100.0, 50.0)] * 4)
-    ends = np.concatenate((others, crowd, segments((639.0, 479.0))))
-    dropped = np.array([False] * 9 + [True] * 5 + [False])
-    np.testing.assert_array_equal(Renewal(config).crowded(ends, (480, 640)), False)
-    full = np.concatenate((ends, segments(*[(100.0 + 40.0 * k, 300.0) for k in range(5)])))
-    expected = np.concatenate((dropped, np.zeros(5, np.bool_)))
-    np.testing.assert_array_equal(Renewal(config).crowded(full, (480, 640)), expected)
+def test_where_there_is_no_room_the_newest_on_movers_in_a_crowded_tile_are_dropped() -> None:
+    """A tile takes two."""
+    renewal = Renewal(PerceptionConfig(fragments=FragmentSettings(max_fragments=20)))
+    static, mover, scattered = (
+        segments(*[(60.0, 50.0)] * 3),
+        segments(*[(100.0, 50.0)] * 5, (639.0, 479.0)),
+        segments(*[(100.0 + 40.0 * k, 300.0) for k in range(11)]),
+    )
+    ends, on_movers = np.concatenate((static, mover, scattered)), np.repeat([False, True], [3, 17])
+    dropped = renewal.crowded(ends, on_movers, (480, 640))
+    assert dropped.nonzero()[0].tolist() == [5, 6, 7]
+    assert not renewal.crowded(ends, np.zeros(20, np.bool_), (480, 640)).any()
+    assert not renewal.crowded(ends[:18], on_movers[:18], (480, 640)).any(), "there is room"
 
 
 def test_ends_are_counted_by_tile_up_to_the_rim_of_the_image() -> None:
