@@ -90,8 +90,9 @@ def govern(options: MissionOptions) -> None:
 @cli.command()
 @click.argument("recording", type=FOLDER_OR_FILE)
 @click.option(
-    "--odometry", type=ODOMETRY, default="auto", show_default="what was recorded, if anything",
-    help="Prior of the camera's motion: odometry.txt or a bag's topic, nothing, or the true poses.",
+    "--odometry", type=ODOMETRY, default="auto", show_default=True,
+    help="Prior of the camera's motion. file: odometry.txt or a bag's topic; auto: that, if there is one; "
+    "none: images and depth alone; groundtruth: the true poses.",
 )  # fmt: skip
 @topic_options
 @config_option("of robot, perception and decision", CONFIG_DIR / "replay.yaml", "the replay.yaml that ships")
