@@ -53,7 +53,7 @@ def emergency(limits: Limits) -> BrakeLimits:
 
 
 def stop(v_mps: float, a_mps2: float, limits: BrakeLimits) -> Stop:
-    """The shortest stop that ends with v = 0 and a = 0 (motion-formulas 4.7).
+    """The shortest stop that ends with v = 0 and a = 0.
 
     An acceleration outside the limits is first brought inside them. Where the speed is too small to let go of
     a deceleration in time (v < a^2 / 2J, only after a fault), the deceleration drops to zero at standstill:
@@ -75,8 +75,8 @@ def required_distance(
 ) -> float:
     """The distance at which something must be seen so that the robot stands before it arrives, in metres.
 
-    S_n = (V + V_o) tau + S(V, a) + V_o T(V, a) + margin (motion-formulas 4.8). closing_mps: of the obstacle's
-    own towards the robot; what moves away counts as standing. Raises ValueError as stop(), and for any NaN.
+    S_n = (V + V_o) tau + S(V, a) + V_o T(V, a) + margin. closing_mps: V_o, the obstacle's own speed
+    towards the robot; what moves away counts as standing. Raises ValueError as stop(), and for any NaN.
     """
     decel_mps2, jerk_mps3 = limits.decel_mps2, limits.jerk_mps3
     required_m = margin_m + _required_m(v_mps, a_mps2, closing_mps, latency_s, decel_mps2, jerk_mps3)
@@ -97,7 +97,7 @@ def speed_for_distance(
     """The greatest speed with required_distance(...) <= distance_m: its inverse; 0 where none fits.
 
     a_mps2: the present acceleration. Without it, where A is reached, this is v = -A b + sqrt(A^2 b^2 + 2 A d)
-    with b = tau + A / 2J + V_o / A (4.7), else the root of a cubic in sqrt(v). Raises ValueError for NaN.
+    with b = tau + A / 2J + V_o / A, else the root of a cubic in sqrt(v). Raises ValueError for NaN.
     """
     free_m = distance_m - margin_m
     v_mps = _speed_for(free_m, a_mps2, closing_mps, latency_s, limits.decel_mps2, limits.jerk_mps3)

@@ -1,4 +1,4 @@
-"""A speed-dependent protective field, as safety laser scanners monitor it (motion-formulas 4.3).
+"""A speed-dependent protective field, as safety laser scanners monitor it.
 
 S_L = S_A + TZ + Z_R + Z_F + Z_B with S_A = S_Br(v) + t_R v: the stopping distance at the present speed, the
 distance driven in the response time, the scanner's tolerance, and a supplement because a base lower than 120

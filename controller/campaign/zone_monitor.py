@@ -2,8 +2,9 @@
 
 nav2_collision_monitor/params/collision_monitor_params.yaml: a stop polygon that reaches 0.08 m beyond a robot
 of 0.22 m radius, a slowdown polygon (ratio 0.3) that reaches 0.18 m beyond it, both on 4 points, and
-"approach" with time_before_collision 2.0 s in steps of 0.1 s on 6 points: v = v_in t_c / T (motion-formulas
-4.4). The zones are laid around this robot's own footprint. Emergency braking is allowed.
+"approach" with time_before_collision T = 2.0 s in steps of 0.1 s on 6 points: where the commanded speed v_in
+would touch after t_c < T, the speed is v_in t_c / T. The zones are laid around this robot's own footprint.
+Emergency braking is allowed.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
 """Conflicts with bodies that cross the robot's path, and the speeds that solve them. Keeps no state.
 
 A conflict lasts from the time when a body enters the swept corridor until it leaves it, and has the stretch
-of the path that the body blocks meanwhile. likely_enters says which bodies enter (called by
-controller/decision/speed_limits.py), find_conflicts says when and where. choices gives two speeds for a
-conflict: up to yield_mps the robot lets the body pass first, from first_mps on it passes before the body.
-controller/decision/moving_limits.py turns these choices into limits and keeps them from step to step.
+of the path that the body blocks meanwhile. controller/decision/watched.py asks likely_enters which bodies
+enter; find_conflicts says when and where. choices gives two speeds for a conflict: up to yield_mps the robot
+lets the body pass first, from first_mps on it passes before the body. controller/decision/moving_limits.py
+turns these choices into limits and keeps them from step to step.
 """
 
 from __future__ import annotations

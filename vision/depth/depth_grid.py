@@ -30,7 +30,7 @@ CellRays = Annotated[FloatGrid, "float32[::1]"]
 # Noise of a cell's height relative to the noise that one pixel's depth would cause. A cell is the median of
 # many pixels, but these are neighbours and share noise, so the factor is larger than their number suggests.
 # The value is an estimate; above_floor() in vision/depth/connected.py adds a margin. The noise between two
-# frames has been measured and is larger: _CELL_NOISE_OVER_TIME in vision/bodies/arrivals.py.
+# frames has been measured and is larger: CELL_NOISE_OVER_TIME in vision/bodies/arrivals.py.
 CELL_HEIGHT_NOISE = 0.4
 _INVALID_RAW = np.uint16(65535)  # raw depth of an invalid cell: it sorts behind all valid ones
 _MIN_SIDE_PX = 32  # as config/recording.py and config/camera.py require
