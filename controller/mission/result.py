@@ -8,7 +8,8 @@ from pathlib import Path as FilePath
 
 from controller.base.drive_lifecycle import Outcome
 from controller.control import ControlLoop, ControlStep
-from controller.realtime.runner import Punctuality, SceneMessage
+from controller.realtime.messages import SceneMessage
+from controller.realtime.runner import Punctuality
 from controller.record.tally import (
     Complaints,
     FrameTally,

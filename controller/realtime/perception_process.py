@@ -16,7 +16,7 @@ from controller.build import build_path, build_perceiver, open_camera, surroundi
 from controller.control import ControlStep
 from controller.errors import UserError, describe
 from controller.realtime.channel import Channel, PeerGone
-from controller.realtime.runner import STREAM_ENDED, CutOff, Farewell, SceneMessage, StepMessage
+from controller.realtime.messages import STREAM_ENDED, CutOff, Farewell, SceneMessage, StepMessage
 from controller.record.recorder import RecordingOptions, RunRecorder, open_recorder
 from controller.terminal.outlet import say
 from hal.clocks import NS_PER_S, MonotonicClock

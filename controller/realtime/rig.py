@@ -18,9 +18,10 @@ from controller.build_chassis import build_base
 from controller.control import Drive
 from controller.mission.result import MissionOptions
 from controller.realtime.channel import Channel, channel_sockets
+from controller.realtime.perception_link import PerceptionLink
 from controller.realtime.perception_process import perceive_forever
 from controller.realtime.punctual import PunctualChassis
-from controller.realtime.runner import PerceptionLink, Punctuality, RealtimeMoment, run_realtime
+from controller.realtime.runner import Punctuality, RealtimeMoment, run_realtime
 from controller.realtime.scheduling import become_realtime
 from controller.realtime.service import ServiceManager, StopRequest
 from controller.record.recorder import RecordingOptions, require_writable

@@ -15,49 +15,13 @@ from config.app import RealtimeRunner
 from controller.base.drive_lifecycle import Outcome
 from controller.control import ControlStep, Drive
 from controller.lockstep import Outside
-from controller.realtime.channel import Channel, PeerGone
+from controller.realtime.messages import SceneMessage, StepMessage
+from controller.realtime.perception_link import PerceptionLink
 from controller.realtime.service import ServiceManager, StopRequest
 from controller.record.tally import MAX_SAMPLES
 from hal.api import Clock
 from hal.clocks import NS_PER_S
 from hal.types import PlanarPose
-from vision.scene import Scene
-
-# Reason of the farewell at the end of a recording that stands in for the camera.
-STREAM_ENDED = "the camera's stream has ended"
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class SceneMessage:
-    """Perception to control: a scene, and the processing time of its stages."""
-
-    scene: Scene
-    timing_ms: dict[str, float]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class StepMessage:
-    """Control to perception: a control step.
-
-    true_pose: the robot's true pose in a simulated world, for a simulated camera; None without a world.
-    """
-
-    control: ControlStep
-    true_pose: PlanarPose | None
-
-
-@dataclass(frozen=True, slots=True)
-class Farewell:
-    """Perception to control: the last message before the process ends, with the reason."""
-
-    reason: str
-
-
-@dataclass(frozen=True, slots=True)
-class CutOff:
-    """Perception to control: an output of the drive has ended, with the reason. Perception goes on."""
-
-    reason: str
 
 
 @dataclass
@@ -82,54 +46,6 @@ class SimulatedWorld(Outside, Protocol):
 
     @property
     def body_pose(self) -> PlanarPose: ...
-
-
-class PerceptionLink:
-    """The control process's link to the perception process. Once lost, it stays lost.
-
-    newest: the newest scene.
-    lost_reason: why the link is lost; None if it is not.
-    refused_reason: the same, if perception said farewell before its first scene.
-    cut_off: why outputs of the drive (observations, video, recording) are not whole.
-    """
-
-    def __init__(self, channel: Channel) -> None:
-        self._channel = channel
-        self.cut_off: list[str] = []
-        self.newest: SceneMessage | None = None
-        self.lost_reason: str | None = None
-        self.refused_reason: str | None = None
-
-    def receive(self) -> list[SceneMessage]:
-        """All scenes that have arrived since the last call, oldest first."""
-        arrived: list[SceneMessage] = []
-        if self.lost_reason is not None:
-            return arrived
-        try:
-            while self.lost_reason is None and (message := self._channel.receive()) is not None:
-                if isinstance(message, SceneMessage):
-                    arrived.append(message)
-                elif isinstance(message, CutOff):
-                    self.cut_off.append(message.reason)
-                else:
-                    assert isinstance(message, Farewell), f"perception sent {type(message).__name__}"
-                    self.lost_reason = message.reason
-                    if self.newest is None and not arrived:
-                        self.refused_reason = message.reason
-        except PeerGone as gone:
-            self.lost_reason = str(gone)
-        if arrived:
-            self.newest = arrived[-1]
-        return arrived
-
-    def send(self, message: StepMessage) -> None:
-        """Send the control step to perception; the message is dropped if the buffer is full."""
-        if self.lost_reason is not None:
-            return
-        try:
-            self._channel.send(message)
-        except PeerGone as gone:
-            self.lost_reason = str(gone)
 
 
 @dataclass(frozen=True, slots=True)

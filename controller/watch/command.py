@@ -22,8 +22,10 @@ from controller.errors import UserError
 from controller.mission.command import with_overrides
 from controller.mission.result import MissionOptions
 from controller.mission.scenario_faults import with_scenario_faults
+from controller.realtime.messages import STREAM_ENDED
+from controller.realtime.perception_link import PerceptionLink
 from controller.realtime.rig import HEAD_START_S, perception_beside
-from controller.realtime.runner import STREAM_ENDED, PerceptionLink, Punctuality, run_realtime
+from controller.realtime.runner import Punctuality, run_realtime
 from controller.realtime.service import ServiceManager, StopRequest
 from controller.record.observations import STANDARD_OUTPUT
 from controller.record.recorder import RecordingOptions, require_writable

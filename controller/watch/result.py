@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from controller.control import ControlStep
-from controller.realtime.runner import SceneMessage
+from controller.realtime.messages import SceneMessage
 from controller.record.tally import Complaints, ConditionTally, FrameTally, TimingTally
 from hal.clocks import NS_PER_S
 from hal.geometry import camera_in_body, wrap_angle_rad

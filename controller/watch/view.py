@@ -9,7 +9,7 @@ import numpy as np
 from config.robot import Mount
 from controller.control import ControlStep
 from controller.decision.decision import Decision
-from controller.realtime.runner import SceneMessage
+from controller.realtime.messages import SceneMessage
 from controller.terminal.console import Console
 from controller.watch.result import Floor, Relative, WatchResult
 from hal.clocks import NS_PER_S

@@ -10,8 +10,8 @@ from config.app import load_app
 from config.loader import CONFIG_DIR
 from controller.perceive import Perceiver
 from controller.realtime.channel import Channel, PeerGone, channel_sockets
+from controller.realtime.messages import Farewell, StepMessage
 from controller.realtime.perception_process import RemoteBody, perceive_forever
-from controller.realtime.runner import Farewell, StepMessage
 from controller.record.recorder import RecordingOptions
 from hal.types import CameraMount, PlanarPose
 from tests.support.runner_doubles import control_step

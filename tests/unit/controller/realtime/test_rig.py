@@ -18,9 +18,11 @@ from controller.control import ControlLoop
 from controller.mission.result import MissionOptions
 from controller.realtime import rig as realtime_rig
 from controller.realtime.channel import Channel, PeerGone, channel_sockets
+from controller.realtime.messages import CutOff
+from controller.realtime.perception_link import PerceptionLink
 from controller.realtime.punctual import PunctualChassis
 from controller.realtime.rig import RealtimeRig, perception_beside
-from controller.realtime.runner import CutOff, PerceptionLink, Punctuality
+from controller.realtime.runner import Punctuality
 from controller.record.recorder import RecordingOptions
 from controller.terminal.console import Console
 from hal.clocks import MonotonicClock

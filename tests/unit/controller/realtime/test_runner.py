@@ -5,15 +5,9 @@ import pytest
 from config.app import RealtimeRunner
 from controller.base.drive_lifecycle import Outcome
 from controller.realtime.channel import Channel, channel_sockets
-from controller.realtime.runner import (
-    CutOff,
-    Farewell,
-    PerceptionLink,
-    Punctuality,
-    SceneMessage,
-    StepMessage,
-    run_realtime,
-)
+from controller.realtime.messages import CutOff, Farewell, SceneMessage, StepMessage
+from controller.realtime.perception_link import PerceptionLink
+from controller.realtime.runner import Punctuality, run_realtime
 from controller.realtime.service import ServiceManager, StopRequest
 from hal.types import PlanarPose
 from tests.support.runner_doubles import RecordingDrive, control_step

@@ -11,7 +11,7 @@ from config.app import load_app
 from config.loader import CONFIG_DIR
 from controller.base.drive_lifecycle import Outcome
 from controller.control import ControlStep
-from controller.realtime.runner import SceneMessage
+from controller.realtime.messages import SceneMessage
 from controller.terminal.console import Console
 from controller.watch.command import build_watch_loop
 from controller.watch.no_base import NoBase
