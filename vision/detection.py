@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.types import Intrinsics, Pose
-from vision.camera.health import worsened
 from vision.depth.depth_grid import DepthGrid
 from vision.ego_motion.camera_motion import CameraEstimate
 from vision.ego_motion.motion_prior import MotionPrior
 from vision.motion.velocities import EndResiduals
-from vision.scene import CameraCondition, CameraHealth, EgoMotion, SeenFloor
+from vision.scene import CameraHealth, EgoMotion, SeenFloor
 
 # The ego-motion of a frame that was not compared with the one before.
 MOTION_NOT_KNOWN = EgoMotion(
@@ -68,39 +67,6 @@ class Detection:
     reckoned: bool
     blurred: bool
     floor: SeenFloor | None = None
-
-
-def camera_health(health: CameraHealth, ego: EgoMotion, blurred: bool, reckoned: bool) -> CameraHealth:
-    """health, worsened by what the ego-motion shows.
-
-    blurred: without odometry, too few fragments fit one motion of the camera. reckoned: there is odometry.
-    """
-    if blurred:
-        reason = (
-            f"only {ego.inlier_ratio:.0%} of the fragments fit one motion of the camera:"
-            " is depth aligned with colour, in place and in time?"
-        )
-        return worsened(health, CameraCondition.DEGRADED, reason)
-    if ego.source == "visual":
-        return health
-    if ego.source == "disputed" and not reckoned:
-        # By the kinematics of the base (rolling_prior of vision/ego_motion/motion_prior.py).
-        reason = (
-            "the images show a motion of the camera that a tracked base hardly makes, sideways or too sudden:"
-            " is the camera loose, does the base slide, or does everything in view move?"
-        )
-        return worsened(health, CameraCondition.DEGRADED, reason)
-    if ego.source == "disputed":
-        reason = (
-            "the images and the odometry tell of two motions of the camera:"
-            " do the tracks slip, or is the odometry wrong?"
-        )
-        return worsened(health, CameraCondition.DEGRADED, reason)
-    if ego.source == "odometry":
-        reason = "too few static fragments: the camera's motion rests on the odometry alone"
-        return worsened(health, CameraCondition.DEGRADED, reason)
-    reason = "the camera's motion is not known: too few static fragments agree, and there is no odometry"
-    return worsened(health, CameraCondition.UNTRUSTWORTHY, reason)
 
 
 def ego_motion_of(found: CameraEstimate, step: Pose, dt_s: float, prior: MotionPrior) -> EgoMotion:

@@ -17,12 +17,12 @@ from config.perception import PerceptionConfig
 from hal.types import CameraMount, FloatArray, Pose, RgbdFrame
 from vision.camera.floor import FloorFinder, on_floor
 from vision.camera.gyro import GyroMemory
-from vision.camera.health import Continuity, HealthMonitor
+from vision.camera.health import Continuity, HealthMonitor, with_ego_motion
 from vision.camera.lens import vector_from_rotation
 from vision.camera.mount_check import MountCheck
 from vision.depth.depth_grid import DepthGrid, make_grid
 from vision.depth.depth_mask import surface_depth
-from vision.detection import MOTION_NOT_KNOWN, Detection, camera_health, ego_motion_of, no_motion
+from vision.detection import MOTION_NOT_KNOWN, Detection, ego_motion_of, no_motion
 from vision.ego_motion.camera_motion import MIN_AGREEMENT, CameraEstimate, estimate
 from vision.ego_motion.lone_body import bodies_px
 from vision.ego_motion.motion_memory import MotionMemory
@@ -130,7 +130,7 @@ class Detector:
         detection = self._detection(
             frame,
             grid,
-            camera_health(health, ego, blurred, reckoned),
+            with_ego_motion(health, ego, blurred, reckoned),
             motion,
             ego,
             dt_s=dt_s,

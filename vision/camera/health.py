@@ -1,6 +1,7 @@
 """Camera health: whether a frame can be trusted, and if not, why, in a plain sentence.
 
-vision/detector.py asks before it tracks anything in the frame. In doubt a frame is not trusted.
+vision/detector.py asks before it tracks anything in the frame (HealthMonitor), and once the camera's motion
+is estimated (with_ego_motion). In doubt a frame is not trusted.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from hal.types import Pose, RgbdFrame
 from vision.camera.frozen_depth import FrozenDepth
 from vision.depth.depth_grid import DepthGrid
 from vision.fragments.edges import GreyImage
-from vision.scene import CameraCondition, CameraHealth
+from vision.scene import CameraCondition, CameraHealth, EgoMotion
 
 _STEP = 16  # pixels between two samples: 1200 samples of 640x480 are enough for shares
 _BLACK_LEVEL = 12  # grey: black, with room for a sensor's noise
@@ -174,6 +175,39 @@ def worsened(health: CameraHealth, condition: CameraCondition, reason: str) -> C
     """health with one more finding; the worse condition stands."""
     present = [] if health.condition is CameraCondition.GOOD else [(health.condition, health.reason)]
     return _verdict([*present, (condition, reason)], health.valid_depth_ratio)
+
+
+def with_ego_motion(health: CameraHealth, ego: EgoMotion, blurred: bool, reckoned: bool) -> CameraHealth:
+    """health, worsened by what the ego-motion shows.
+
+    blurred: without odometry, too few fragments fit one motion of the camera. reckoned: there is odometry.
+    """
+    problem = _motion_problem(ego, blurred, reckoned)
+    return health if problem is None else worsened(health, *problem)
+
+
+def _motion_problem(ego: EgoMotion, blurred: bool, reckoned: bool) -> _Problem | None:
+    if blurred:
+        return _POOR, (
+            f"only {ego.inlier_ratio:.0%} of the fragments fit one motion of the camera:"
+            " is depth aligned with colour, in place and in time?"
+        )
+    if ego.source == "visual":
+        return None
+    if ego.source == "disputed" and reckoned:
+        return _POOR, (
+            "the images and the odometry tell of two motions of the camera:"
+            " do the tracks slip, or is the odometry wrong?"
+        )
+    if ego.source == "disputed":
+        # By the kinematics of the base (rolling_prior of vision/ego_motion/motion_prior.py).
+        return _POOR, (
+            "the images show a motion of the camera that a tracked base hardly makes, sideways or too sudden:"
+            " is the camera loose, does the base slide, or does everything in view move?"
+        )
+    if ego.source == "odometry":
+        return _POOR, "too few static fragments: the camera's motion rests on the odometry alone"
+    return _BAD, "the camera's motion is not known: too few static fragments agree, and there is no odometry"
 
 
 def _verdict(problems: list[_Problem], share: float) -> CameraHealth:
