@@ -31,7 +31,7 @@ from vision.bodies.tracks import Tracks
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import DepthGrid, FloatGrid
 from vision.depth.depth_noise import depth_sigma_of
-from vision.numerics.relative_pose import NEAREST_M, Row, coordinate_m, relative_row
+from vision.numerics.relative_pose import NEAREST_M, Rows, coordinate_m, relative_rows
 
 # In the longer time a slow vehicle 6 m away comes nearer by twice the error. The shorter one shows jumps.
 _LOOK_BACK_S = (0.6, 0.3)
@@ -113,7 +113,7 @@ def _since(
 
     cells: number of cells of each track, 0 for tracks that are not asked for, (T,).
     """
-    lag_s = (now_ns - then.stamp_ns) * 1e-9
+    lag_s = then.ago_s(now_ns)
     mps, sigma_mps = _compared(grid, labels, cells, pose, then.pose, then.inverse, noise, lag_s)
     return Approach(mps, sigma_mps, lag_s)
 
@@ -127,9 +127,7 @@ def _cell_sigma_m(depth_m: float, noise: DepthNoise) -> float:
 
 
 @inlined
-def _nearer_m(
-    grid: DepthGrid, i: int, j: int, rows: tuple[Row, Row, Row], seen: FloatGrid
-) -> tuple[float, float]:
+def _nearer_m(grid: DepthGrid, i: int, j: int, rows: Rows, seen: FloatGrid) -> tuple[float, float]:
     """By how much cell i, j is nearer than what was seen in its place then, NaN where nothing was; and its
     depth in that view.
 
@@ -165,7 +163,7 @@ def _compared(
     cells (T,): as _since. seen (h, w): 1/m, from old_pose, lag_s ago; 0 where not measured.
     """
     height, width = labels.shape
-    rows = relative_row(old_pose, pose, 0), relative_row(old_pose, pose, 1), relative_row(old_pose, pose, 2)
+    rows = relative_rows(old_pose, pose)
     # The displacements of all tracks one after the other, those of track t from first[t] on.
     first = np.cumsum(cells) - cells
     nearer_m, depth_m = np.empty(cells.sum()), np.zeros(len(cells))

@@ -22,7 +22,7 @@ from hal.compiled import compiled, inlined
 from hal.types import FloatArray, Pose
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import BoolGrid, DepthGrid, FloatGrid
-from vision.numerics.relative_pose import NEAREST_M, Row, coordinate_m, relative_row
+from vision.numerics.relative_pose import NEAREST_M, Rows, coordinate_m, relative_rows
 
 # Every second view at 30 frames a second is kept. A look back takes the view closest to the wanted time.
 _KEEP_EVERY_S, _KEPT_FOR_S = 0.06, 1.2
@@ -69,6 +69,10 @@ class View:
     nearest_inverse: FloatGrid
     inverse: FloatGrid
 
+    def ago_s(self, now_ns: int) -> float:
+        """How long ago it was seen."""
+        return (now_ns - self.stamp_ns) * 1e-9
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Changes:
@@ -93,23 +97,23 @@ class ViewMemory:
 
     def __init__(self, noise: DepthNoise) -> None:
         self._noise = noise
-        self._memories: list[View] = []
+        self._views: list[View] = []
 
     def clear(self) -> None:
         """Forget all views: their poses cannot be compared with those to come."""
-        self._memories.clear()
+        self._views.clear()
 
     def changes(self, grid: DepthGrid, mask: BoolGrid, pose: Pose, now_ns: int) -> Changes:
         """Which of the cells of mask (h, w) have arrived and which have stayed."""
         arrived, stayed, stayed_s = np.zeros(mask.shape, np.bool_), np.zeros(mask.shape, np.bool_), 0.0
         for wanted_s in _LOOK_BACK_S:
-            memory = self.view_of(now_ns, wanted_s)
-            if memory is None:
+            then = self.view_of(now_ns, wanted_s)
+            if then is None:
                 continue
-            nearer, same = self._compare(grid, mask, pose, memory.pose, memory.nearest_inverse)
+            nearer, same = self._compare(grid, mask, pose, then.pose, then.nearest_inverse)
             arrived |= nearer
             if wanted_s == _LOOK_BACK_S[-1]:
-                stayed, stayed_s = same, (now_ns - memory.stamp_ns) * 1e-9
+                stayed, stayed_s = same, then.ago_s(now_ns)
         return Changes(*_in_company(arrived, np.flatnonzero(arrived)), stayed, stayed_s)
 
     def stayed(
@@ -121,12 +125,12 @@ class ViewMemory:
         front of a wall is distinguished from it up to 3.5 m away. Only neighbours in mask confirm a cell. No
         cells, and 0.0 s, if there is no view of that time.
         """
-        memory = self.view_of(now_ns, wanted_s)
-        if memory is None:
+        then = self.view_of(now_ns, wanted_s)
+        if then is None:
             return np.zeros(mask.shape, np.bool_), 0.0
-        _, same = self._compare(grid, mask, pose, memory.pose, memory.inverse, _SURELY)
+        _, same = self._compare(grid, mask, pose, then.pose, then.inverse, _SURELY)
         same, _ = _in_company(same, np.flatnonzero(same))
-        return same, (now_ns - memory.stamp_ns) * 1e-9
+        return same, then.ago_s(now_ns)
 
     def resolves_m(self, distance_m: FloatArray) -> FloatArray:
         """(N,) minimum difference in depth at which two surfaces at distance_m (N,) can be distinguished."""
@@ -136,24 +140,24 @@ class ViewMemory:
 
     def remember(self, grid: DepthGrid, pose: Pose, now_ns: int) -> None:
         """Keep this view, unless the last one was kept less than _KEEP_EVERY_S ago."""
-        if self._memories and (now_ns - self._memories[-1].stamp_ns) * 1e-9 < _KEEP_EVERY_S:
+        if self._views and self._views[-1].ago_s(now_ns) < _KEEP_EVERY_S:
             return
         nearest = np.full(grid.inverse_depth.shape, _UNKNOWN)
         cv2.copyTo(grid.inverse_depth, grid.valid.view(np.uint8), nearest)
         # Where the measured depth is beyond the range, space was seen free up to the range, no farther.
         nearest[grid.beyond] = np.float32(1.0 / grid.range_m)
         cv2.dilate(nearest, NEIGHBOURHOOD, nearest)
-        self._memories.append(View(now_ns, pose, nearest, grid.inverse_depth))
+        self._views.append(View(now_ns, pose, nearest, grid.inverse_depth))
         horizon_ns = now_ns - int(1e9 * _KEPT_FOR_S)
-        self._memories = [m for m in self._memories if m.stamp_ns >= horizon_ns]
+        self._views = [view for view in self._views if view.stamp_ns >= horizon_ns]
 
     def view_of(self, now_ns: int, wanted_s: float) -> View | None:
         """The view closest to wanted_s ago, if there is one within 0.5 to 1.5 times of it."""
         best, gap = None, (_OLDEST - 1.0) * wanted_s
-        for memory in self._memories:
-            off = abs((now_ns - memory.stamp_ns) * 1e-9 - wanted_s)
+        for view in self._views:
+            off = abs(view.ago_s(now_ns) - wanted_s)
             if off <= gap:
-                best, gap = memory, off
+                best, gap = view, off
         return best
 
     def _compare(
@@ -175,9 +179,7 @@ class ViewMemory:
 
 
 @inlined
-def _project_row(
-    grid: DepthGrid, row: int, rows: tuple[Row, Row, Row], cell: IntGrid, inverse: FloatGrid
-) -> None:
+def _project_row(grid: DepthGrid, row: int, rows: Rows, cell: IntGrid, inverse: FloatGrid) -> None:
     """Project the cells of one row into the other view.
 
     Puts the flat cell of that view, -1 outside of it, into cell (w,) and the inverse depth there into inverse
@@ -213,11 +215,7 @@ def _compared(
     height, width = mask.shape
     nearer, same = np.zeros((height, width), np.bool_), np.zeros((height, width), np.bool_)
     cell, inverse, seen = np.empty(width, np.int32), np.empty(width, np.float32), seen_inverse.ravel()
-    rows = (
-        relative_row(old_pose, pose, 0),
-        relative_row(old_pose, pose, 1),
-        relative_row(old_pose, pose, 2),
-    )
+    rows = relative_rows(old_pose, pose)
     for i in range(height):
         if not mask[i].any():
             continue

@@ -19,7 +19,7 @@ from hal.types import FloatArray, Pose
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import BoolGrid, DepthGrid, FloatGrid
 from vision.numerics.pose_axes import inner_vector
-from vision.numerics.relative_pose import NEAREST_M, coordinate_m, relative_row
+from vision.numerics.relative_pose import NEAREST_M, coordinate_m, relative_rows
 
 # The gate on depth is the sum of both: as large as a jump in depth within one part may be (in 1/m), and how
 # much nearer or farther a surface may get (in m), besides the track's velocity, as a body turns or bends.
@@ -100,9 +100,7 @@ def _predicted(
     result, nearest = np.zeros((height, width), np.int32), np.zeros((height, width), np.float32)
     left, top = grid.x[0], grid.y[0]
     per_column, per_row = np.float32(1.0) / (grid.x[1] - left), np.float32(1.0) / (grid.y[1] - top)
-    to_x = relative_row(pose, old_pose, 0)
-    to_y = relative_row(pose, old_pose, 1)
-    to_z = relative_row(pose, old_pose, 2)
+    to_x, to_y, to_z = relative_rows(pose, old_pose)
     displacement_m = np.zeros(shift_m.shape, np.float32)  # in the camera's axes now
     for track in range(len(shift_m)):
         displacement_m[track] = inner_vector(pose, shift_m[track])

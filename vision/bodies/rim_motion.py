@@ -23,7 +23,7 @@ from vision.bodies.tracks import Tracks
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import DepthGrid
 from vision.depth.rims import NO_RIM, FreeRims, free_rims
-from vision.numerics.relative_pose import NEAREST_M, Row, coordinate_m, relative_row
+from vision.numerics.relative_pose import NEAREST_M, Rows, coordinate_m, relative_rows
 
 # Rims are compared over 0.2 s, rounded to frames: a walking person moves by 0.2 m, five times the width of a
 # cell 6 m away, and by less than a step, so that a leg does not change its side.
@@ -124,7 +124,7 @@ def _add_shifts(
     column: NDArray[np.int32],
     old_column: NDArray[np.int32],
     old_depth_m: np.float32,
-    rows: tuple[Row, Row, Row],
+    rows: Rows,
     farthest_m: float,
     shift_m: FloatArray,
     sums: FloatArray,
@@ -174,7 +174,7 @@ def _measured(
     track: present index of each track of then, -1 if it has ended.
     """
     result = _nothing_measured(len(now.column))
-    rows = relative_row(pose, old_pose, 0), relative_row(pose, old_pose, 1), relative_row(pose, old_pose, 2)
+    rows = relative_rows(pose, old_pose)
     shift_m, step, sums = np.empty(2 * now.column.shape[2]), grid.x[1] - grid.x[0], np.empty(3)
     for k in range(len(track)):
         t = track[k]

@@ -12,9 +12,18 @@ NEAREST_M = np.float32(0.1)  # the projection of a nearer point is meaningless
 Row = tuple[np.float32, np.float32, np.float32, np.float32]
 
 
+Rows = tuple[Row, Row, Row]
+
+
 @inlined
-def relative_row(to: Pose, of: Pose, axis: int) -> Row:
-    """The row of the transform between the axes of two poses that gives the coordinate along axis of to."""
+def relative_rows(to: Pose, of: Pose) -> Rows:
+    """The transform of points from the axes of one pose, of, to those of another, to."""
+    return _row(to, of, 0), _row(to, of, 1), _row(to, of, 2)
+
+
+@inlined
+def _row(to: Pose, of: Pose, axis: int) -> Row:
+    """The row of the transform that gives the coordinate along axis of to."""
     x, y, z, shift_m = 0.0, 0.0, 0.0, 0.0
     for i in range(3):
         along = to.rotation[i, axis]
