@@ -2,8 +2,8 @@
 
 Steps, with their modules: velocities of fragments (least_squares); arrived and stayed surfaces (arrivals);
 cells to tracks (masks, connected, votes, grouping, births); suspects and furniture cut out (carving,
-left_behind, cutting); movers extended to the floor (grounding); bodies joined and divided (merging,
-division); filters (sightings, rim_motion, approach); fragments to tracks (adoption); velocities of bodies
+left_behind, cutting); movers extended to the floor (grounding); bodies joined and divided (regrouping);
+filters (sightings, rim_motion, approach); fragments to tracks (adoption); velocities of bodies
 (least_squares); verdict (judgement); report. Terms: vision/__init__.py.
 """
 
@@ -19,12 +19,10 @@ from vision.bodies import (
     births,
     carving,
     cutting,
-    division,
     grounding,
     grouping,
     left_behind,
     masks,
-    merging,
     report,
     rim_motion,
     sightings,
@@ -35,6 +33,7 @@ from vision.bodies.arrivals import Changes, ViewMemory, arriving
 from vision.bodies.few_fragments import bodies_needing_fragments
 from vision.bodies.judgement import judge
 from vision.bodies.motion_evidence import evidence_of
+from vision.bodies.regrouping import regrouped
 from vision.bodies.tracks import Tracks
 from vision.depth import connected, occlusion, regions
 from vision.depth.connected import IntGrid
@@ -44,7 +43,7 @@ from vision.depth.near_floor import NearFloor
 from vision.depth.regions import Regions
 from vision.detection import Detection
 from vision.motion import least_squares, limbs
-from vision.motion.least_squares import FragmentVelocities
+from vision.motion.least_squares import BodyVelocities, FragmentVelocities
 from vision.percept import Percept
 from vision.scene import IMPLAUSIBLE_SPEED_FACTOR, CameraCondition, FreeSpace, Scene
 
@@ -123,9 +122,10 @@ class Tracker:
         if tracks.overhead.any():
             tracks.overhead &= ~births.reaching_down(grid, whole, len(tracks), self._body_height_m)
         owner = adopt(tracks, detection, whole, owner, noise)
-        arrivals = masks.count_cells(whole, changes.arrived_cells, len(tracks))
         if detection.dt_s > 0 and len(tracks):
-            self._measure_velocities(detection, owner, velocities, arrivals, measured.cells, rims, nearing)
+            body = self._fuse_fragments(detection, owner, velocities)
+            arrivals = masks.count_cells(whole, changes.arrived_cells, len(tracks))
+            self._judge(detection, body, arrivals, measured.cells, rims, nearing)
         self._surfaces = masks.surfaces(grid, labels, tracks.ids, pose)
         return owner
 
@@ -148,9 +148,9 @@ class Tracker:
         max_mps = self._config.motion.max_speed_mps
         labels, measured = cutting.cut_out(tracks, detection, labels, measured, cuts, max_mps)
         whole, upright = self._grounded(grid, labels, measured)
-        regrouped = self._regroup(detection, labels, upright, changes)
-        if regrouped is not None:
-            labels = regrouped
+        regrouped_labels = regrouped(tracks, detection, labels, upright, changes)
+        if regrouped_labels is not None:
+            labels = regrouped_labels
             whole, upright = self._grounded(grid, labels, regions.measure(grid, labels, len(tracks)))
         return labels, whole, upright
 
@@ -189,41 +189,11 @@ class Tracker:
         )
         return votes.divide(parts, predicted, ballot, winner)
 
-    def _regroup(
-        self, detection: Detection, labels: IntGrid, measured: Regions, changes: Changes
-    ) -> IntGrid | None:
-        """Join tracks that are one body and divide those that are two: labels then; None: there are none."""
-        tracks, grid = self._tracks, detection.grid
-        may_be_two = tracks.moving | (tracks.restless_s > 0.0)
-        if not may_be_two.any():
-            return None
-        mover = tracks.mover
-        pairs = merging.pairs_to_merge(
-            grid, measured, tracks.state[:, 3:], tracks.velocity_sigma_mps, mover, tracks.moving
-        )
-        displacement_m = tracks.speed_mps * changes.stayed_s
-        labels, gone = merging.merge_labels(grid, labels, pairs, changes.stayed, displacement_m)
-        tracks.merged_away[gone] = True
-        visible = (may_be_two & (measured.cells > 0)).nonzero()[0]
-        seconds = division.second_bodies(grid, labels, visible, changes.stayed, displacement_m)
-        for number, (track, cells) in enumerate(seconds, start=len(tracks) + 1):
-            tracks.start_from(track, carving.SUSPECT_EVIDENCE, detection.captured_ns)
-            labels = labels.copy()
-            labels.ravel()[cells] = number
-        return labels if gone or seconds else None
-
-    def _measure_velocities(
-        self,
-        detection: Detection,
-        owner: NDArray[np.int64],
-        velocities: FragmentVelocities,
-        arrivals: NDArray[np.intp],
-        cells: NDArray[np.intp],
-        rims: rim_motion.RimVelocities,
-        nearing: approach.Approach,
-    ) -> None:
-        """One weighted least squares per body, fused into its filter; then the verdict."""
-        tracks, settings, depth_noise = self._tracks, self._config.motion, self._config.depth_noise
+    def _fuse_fragments(
+        self, detection: Detection, owner: NDArray[np.int64], velocities: FragmentVelocities
+    ) -> BodyVelocities:
+        """One weighted least squares per body, fused into its filter. owner (N,): track of each fragment."""
+        tracks, max_mps = self._tracks, self._config.motion.max_speed_mps
         rotation = detection.pose.rotation
         index = tracks.index_of(owner)
         tracks.fragments = np.bincount(index + 1, minlength=len(tracks) + 1)[1:]
@@ -233,7 +203,7 @@ class Tracker:
             np.repeat(index, 2),
             len(tracks),
             tracks.state[:, 3:] @ rotation,
-            settings.max_speed_mps,
+            max_mps,
         )
         use = limbs.believable(body).nonzero()[0]
         if len(use):
@@ -249,17 +219,35 @@ class Tracker:
                 rotation,
             )
             tracks.update_with_fragments(use, velocity, noise)
-        tracks.restless_s = _sustained(tracks.restless_s, limbs.restless(body), detection.dt_s)
-        tracks.arriving_s = _sustained(tracks.arriving_s, arriving(arrivals, cells), detection.dt_s)
-        tracks.approach_s = approach.approaching_s(tracks.approach_s, nearing, detection.dt_s)
-        tracks.rim_s = rim_motion.one_way_s(tracks.rim_s, rims, settings.sigmas, detection.dt_s)
-        advances = tracks.update_trailing_average(detection.dt_s)
-        seen = evidence_of(tracks, detection, body, advances, arrivals, cells, rims, nearing, depth_noise)
-        verdict = judge(seen, tracks.evidence, tracks.moving, detection.dt_s, settings)
+        return body
+
+    def _judge(
+        self,
+        detection: Detection,
+        body: BodyVelocities,
+        arrivals: NDArray[np.intp],
+        cells: NDArray[np.intp],
+        rims: rim_motion.RimVelocities,
+        nearing: approach.Approach,
+    ) -> None:
+        """The verdict on each track, from all evidence of this frame.
+
+        body, rims, nearing: velocities by fragments, free rims and depth. arrivals, cells (T,): number of
+        newly arrived cells of each surface, and of all its cells.
+        """
+        tracks, dt_s, settings = self._tracks, detection.dt_s, self._config.motion
+        tracks.restless_s = _sustained(tracks.restless_s, limbs.restless(body), dt_s)
+        tracks.arriving_s = _sustained(tracks.arriving_s, arriving(arrivals, cells), dt_s)
+        tracks.approach_s = approach.approaching_s(tracks.approach_s, nearing, dt_s)
+        tracks.rim_s = rim_motion.one_way_s(tracks.rim_s, rims, settings.sigmas, dt_s)
+        advances = tracks.update_trailing_average(dt_s)
+        noise = self._config.depth_noise
+        seen = evidence_of(tracks, detection, body, advances, arrivals, cells, rims, nearing, noise)
+        verdict = judge(seen, tracks.evidence, tracks.moving, dt_s, settings)
         tracks.evidence, tracks.moving = verdict.evidence, verdict.moving
         tracks.confidence, tracks.surely_static = verdict.confidence, verdict.surely_static
         tracks.ever_moved |= verdict.moving
-        tracks.update_durations(verdict.proven, detection.dt_s)
+        tracks.update_durations(verdict.proven, dt_s)
 
     def _percept(
         self,

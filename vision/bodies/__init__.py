@@ -13,6 +13,7 @@ Files, in the order in which they come into play within one frame (vision/tracke
 * left_behind - furniture that a mover has left, to be parted from its track.
 * cutting - what these two have found becomes tracks of its own.
 * grounding - a mover is extended down to the floor.
+* regrouping - tracks are joined and divided, by these two:
 * merging - two tracks that are one body are joined.
 * division - one track that holds two bodies is divided.
 * boxes - geometry of boxes; used by grouping, merging and report.

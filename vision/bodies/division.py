@@ -1,8 +1,9 @@
 """Division of one track that holds two bodies, such as two people who walk side by side.
 
-It takes the cells of one track and returns those of a second body, if there is one. vision/tracker.py calls
-it after merging (vision/bodies/merging.py) for each track that moves, and for each that is restless: a person
-who walks and one who stands, shoulder before shoulder, do not move as one body. Terms: vision/__init__.py.
+It takes the cells of one track and returns those of a second body, if there is one.
+vision/bodies/regrouping.py calls it after merging, for each track that moves, and for each that is restless:
+a person who walks and one who stands, shoulder before shoulder, do not move as one body. Terms:
+vision/__init__.py.
 """
 
 from __future__ import annotations

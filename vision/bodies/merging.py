@@ -1,7 +1,7 @@
 """Merging of two tracks that are one body: pairs_to_merge finds the pairs, merge_labels relabels their cells.
 
-Each rule looks at all pairs of a suspect or mover and a larger moving track at once. vision/tracker.py calls
-this after grounding and before division. Terms: vision/__init__.py.
+Each rule looks at all pairs of a suspect or mover and a larger moving track at once. It is
+called by vision/bodies/regrouping.py, before division. Terms: vision/__init__.py.
 """
 
 from __future__ import annotations
