@@ -17,6 +17,7 @@ Files, in the order in which they come into play within one frame (vision/tracke
 * merging - two tracks that are one body are joined.
 * division - one track that holds two bodies is divided.
 * boxes - geometry of boxes; used by grouping, merging and report.
+* sizes - how large a person is, and other thresholds of several steps.
 * sightings - the Kalman filters are updated by the centroids of the visible surfaces.
 * rim_motion - the speed of half hidden bodies by their free rims.
 * approach - the speed of such bodies towards the camera by the depth of their surface then and now.

@@ -1,4 +1,5 @@
-"""Boxes around regions, in space and in the image: gaps, overlaps, and which lies above or within which.
+"""Boxes around regions, in space and in the image: gaps, overlaps, which lies above or within which, and what
+is seen between two of them.
 
 Used by vision/bodies/grouping.py, merging.py and report.py. Terms: vision/__init__.py.
 """
@@ -13,13 +14,13 @@ from numpy.typing import NDArray
 
 from hal.compiled import compiled
 from hal.types import FloatArray
-from vision.bodies.division import SEEN_THROUGH_HEIGHT, SEEN_THROUGH_SHARE
+from vision.bodies.sizes import NEARER_INVERSE, SEEN_THROUGH_HEIGHT, SEEN_THROUGH_SHARE
 from vision.depth.depth_grid import DepthGrid, nearest_cell
 from vision.depth.regions import Regions
 
 LOAD_GAP_M = 0.8  # maximum gap between a load and its carrier: the load may begin farther back
 SEEN_THROUGH_GAP_M = 1.5  # maximum gap between a vehicle and its own far side, seen through it
-MIN_SAMPLES = 3  # of the cells sampled between two regions: with at least this many, something is there
+_MIN_SAMPLES = 3  # of the cells sampled between two regions: with at least this many, something is there
 _SAMPLES = 24  # cells sampled on the way from one region to another
 _STACKED_SHARE = 0.7  # of a load's width is above its carrier at least; the rest may jut out
 _TOUCHING_PX = 16.0  # two edges in the image touch: 4 cells, since the rims at a jump in depth are of neither
@@ -99,16 +100,39 @@ def overlaps(a: FloatArray, b: FloatArray) -> FloatArray:
     return result
 
 
-def cells_between(
+def nearer_between(
+    grid: DepthGrid, regions: Regions, one: NDArray[np.intp], other: NDArray[np.intp]
+) -> NDArray[np.bool_]:
+    """(K,) whether something nearer lies between the middles of regions one[k] and other[k] in the image."""
+    inverse = grid.inverse_depth.ravel().take(_cells_between(grid, regions, one, other))
+    depth = np.minimum(regions.position_m[one, 2], regions.position_m[other, 2])
+    nearer = inverse > 1.0 / np.maximum(depth, 0.1) + NEARER_INVERSE
+    result: NDArray[np.bool_] = nearer.sum(axis=0) >= _MIN_SAMPLES
+    return result
+
+
+def farther_between(
+    grid: DepthGrid, regions: Regions, one: NDArray[np.intp], other: NDArray[np.intp]
+) -> NDArray[np.bool_]:
+    """(K,) whether something farther is seen between the middles of regions one[k] and other[k]."""
+    cells = _cells_between(grid, regions, one, other)
+    inverse, beyond = grid.inverse_depth.ravel().take(cells), grid.beyond.ravel().take(cells)
+    depth = np.maximum(regions.position_m[one, 2], regions.position_m[other, 2])
+    farther = (inverse > 0.0) & (inverse < 1.0 / np.maximum(depth, 0.1) - NEARER_INVERSE)
+    result: NDArray[np.bool_] = (farther | beyond).sum(axis=0) >= _MIN_SAMPLES
+    return result
+
+
+def _cells_between(
     grid: DepthGrid, regions: Regions, one: NDArray[np.intp], other: NDArray[np.intp]
 ) -> NDArray[np.intp]:
     """(24, K) flat cells on the straight line in the image from the middle of region one[k] to other[k]'s."""
     height, width = grid.depth_m.shape
-    return _cells_between(regions.bbox_px, one, other, grid.offset_px, grid.step_px, height, width)
+    return _on_the_line(regions.bbox_px, one, other, grid.offset_px, grid.step_px, height, width)
 
 
 @compiled("float64[:, :], int64[:], int64[:], float64, float64, int64, int64")
-def _cells_between(
+def _on_the_line(
     bbox_px: FloatArray,
     one: NDArray[np.intp],
     other: NDArray[np.intp],

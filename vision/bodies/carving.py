@@ -28,9 +28,9 @@ from hal.types import FloatArray
 from vision.bodies.arrivals import ARRIVED_UP_TO_S, Changes
 from vision.bodies.births import MIN_CELLS
 from vision.bodies.cutting import Cut
-from vision.bodies.division import SINGLE_WIDTH_M
 from vision.bodies.ends import near_ends
 from vision.bodies.masks import cells_of
+from vision.bodies.sizes import SINGLE_WIDTH_M
 from vision.bodies.tracks import Tracks
 from vision.depth import connected
 from vision.depth.connected import IntGrid

@@ -13,26 +13,24 @@ from numpy.typing import NDArray
 
 from hal.types import FloatArray
 from vision.bodies.births import MIN_CELLS
+from vision.bodies.sizes import (
+    LOW_BESIDE,
+    NEARER_INVERSE,
+    SEEN_THROUGH_HEIGHT,
+    SEEN_THROUGH_SHARE,
+    SINGLE_WIDTH_M,
+)
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import BoolGrid, DepthGrid
 from vision.numerics.order import median, quantile, quantiles
 
-SINGLE_WIDTH_M = 0.85  # no single person is wider
-NEARER_INVERSE = 0.02  # 1/m: something is in front of a body if its inverse depth is larger by this
 _PAIR_DISTANCE_M = 0.5  # minimum distance of the middles of two people side by side, shoulder to shoulder
 # A valley between two bodies holds at most this share of the surface of the lower hill beside it. It is not
 # empty, since arms touch.
 _VALLEY = 0.35
-# A group of cells is seen through another one if this share of it is within the other's box.
-SEEN_THROUGH_SHARE = 0.9
-# A group is low beside a body if it is at most this share as tall in the image: a trolley is, a child beside
-# an adult is not.
-LOW_BESIDE = 0.6
 # A group is static if fewer of its cells have left than this share of those that would have left, had it
 # moved along.
 _STANDING = 0.5
-# A group seen through another one is at most this share as tall; a person behind it is taller.
-SEEN_THROUGH_HEIGHT = 0.5
 _DIP_M = 0.15  # minimum depth of the dip between two heads; a shoulder is lower still
 # Shape of a head: a load is wider; a post is narrower and has no shoulders.
 _HEAD_M = 0.15  # its width is measured this far below its top

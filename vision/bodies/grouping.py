@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 
 from hal.compiled import compiled
 from hal.types import Matrix, Vector
-from vision.bodies.boxes import LOAD_GAP_M, MIN_SAMPLES, SEEN_THROUGH_GAP_M, cells_between, relations
-from vision.bodies.division import NEARER_INVERSE
+from vision.bodies.boxes import LOAD_GAP_M, SEEN_THROUGH_GAP_M, nearer_between, relations
 from vision.depth.depth_grid import DepthGrid
 from vision.depth.regions import Regions
 
@@ -69,7 +68,7 @@ def expected_in(
     result, main = _within_expected_box(parts, bodies, winner, votes, mover)
     part, track = np.nonzero(result)
     if len(part):
-        result[part, track] = something_nearer_between(grid, parts, part, main[track])
+        result[part, track] = nearer_between(grid, parts, part, main[track])
     return result
 
 
@@ -106,17 +105,6 @@ def _within_expected_box(
                 and abs(parts.position_m[p, 2] - bodies.centre_m[t, 2]) <= room_z
             )
     return result, main
-
-
-def something_nearer_between(
-    grid: DepthGrid, parts: Regions, one: NDArray[np.intp], other: NDArray[np.intp]
-) -> NDArray[np.bool_]:
-    """(K,) whether something nearer lies between the middles of parts one[k] and other[k] in the image."""
-    inverse = grid.inverse_depth.ravel().take(cells_between(grid, parts, one, other))
-    depth = np.minimum(parts.position_m[one, 2], parts.position_m[other, 2])
-    nearer = inverse > 1.0 / np.maximum(depth, 0.1) + NEARER_INVERSE
-    result: NDArray[np.bool_] = nearer.sum(axis=0) >= MIN_SAMPLES
-    return result
 
 
 def detach(

@@ -21,8 +21,8 @@ from hal.types import FloatArray, Pose
 from vision.bodies.arrivals import NEIGHBOURHOOD, ViewMemory
 from vision.bodies.births import MIN_CELLS
 from vision.bodies.cutting import Cut
-from vision.bodies.division import SINGLE_WIDTH_M
 from vision.bodies.masks import cells_of
+from vision.bodies.sizes import SINGLE_WIDTH_M
 from vision.bodies.tracks import Tracks
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import BoolGrid, DepthGrid

@@ -12,9 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.types import FloatArray
-from vision.bodies.boxes import LOAD_GAP_M, MIN_SAMPLES, SEEN_THROUGH_GAP_M, boxes, cells_between, relations
-from vision.bodies.division import LOW_BESIDE, NEARER_INVERSE, SINGLE_WIDTH_M, second_body
-from vision.bodies.grouping import something_nearer_between
+from vision.bodies.boxes import (
+    LOAD_GAP_M,
+    SEEN_THROUGH_GAP_M,
+    boxes,
+    farther_between,
+    nearer_between,
+    relations,
+)
+from vision.bodies.division import second_body
+from vision.bodies.sizes import LOW_BESIDE, SINGLE_WIDTH_M
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import BoolGrid, DepthGrid
 from vision.depth.regions import Regions
@@ -95,10 +102,10 @@ def pairs_to_merge(
     one |= _wheel(pairs, regions.cells, velocity_mps)
     halves = _halves(pairs, regions, velocity_mps) & ~one
     if halves.any():
-        halves &= something_nearer_between(grid, regions, small, large)
+        halves &= nearer_between(grid, regions, small, large)
     pieces = (_pieces(pairs, regions, velocity_mps) | _above(pairs, regions) | halves) & ~one
     if pieces.any():
-        one |= pieces & ~_seen_between(grid, regions, small, large)
+        one |= pieces & ~farther_between(grid, regions, small, large)
     small, large = small[one], large[one]
     away = np.abs(regions.position_m[small, 2] - regions.position_m[large, 2])
     closest_first = np.lexsort((away, pairs.gap_m[one]))
@@ -236,18 +243,6 @@ def _above(pairs: _Pairs, regions: Regions) -> BoolArray:
         & (pairs.gap_m <= _PARTED_M)
     )
     result: BoolArray = over & pairs.person_width & pairs.velocities_compatible
-    return result
-
-
-def _seen_between(
-    grid: DepthGrid, regions: Regions, one: NDArray[np.intp], other: NDArray[np.intp]
-) -> NDArray[np.bool_]:
-    """(K,) whether something farther is seen between the middles of regions one[k] and other[k]."""
-    cells = cells_between(grid, regions, one, other)
-    inverse, beyond = grid.inverse_depth.ravel().take(cells), grid.beyond.ravel().take(cells)
-    depth = np.maximum(regions.position_m[one, 2], regions.position_m[other, 2])
-    farther = (inverse > 0.0) & (inverse < 1.0 / np.maximum(depth, 0.1) - NEARER_INVERSE)
-    result: NDArray[np.bool_] = (farther | beyond).sum(axis=0) >= MIN_SAMPLES
     return result
 
 

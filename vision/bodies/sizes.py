@@ -1,0 +1,14 @@
+"""What the size of a body tells, and what is in front of it: thresholds that several steps have in common.
+
+How wide one person is decides what is cut out of a track, what is joined and what is divided.
+"""
+
+SINGLE_WIDTH_M = 0.85  # no single person is wider
+NEARER_INVERSE = 0.02  # 1/m: something is in front of a body if its inverse depth is larger by this
+# A group of cells is seen through another one if this share of it is within the other's box.
+SEEN_THROUGH_SHARE = 0.9
+# A group seen through another one is at most this share as tall; a person behind it is taller.
+SEEN_THROUGH_HEIGHT = 0.5
+# A group is low beside a body if it is at most this share as tall in the image: a trolley is, a child beside
+# an adult is not.
+LOW_BESIDE = 0.6
