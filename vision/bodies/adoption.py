@@ -31,6 +31,7 @@ _SAME_DEPTH_M = 0.05  # plus one sigma: smaller differences in depth do not coun
 _NEARER = 0.1  # cost per metre of distance, in metres of difference in depth: prefers nearer bodies
 
 
+@compiled("int64[::1], int64[::1], int64[::1], int64[::1]")
 def inherited(
     known: NDArray[np.int64], owner: NDArray[np.int64], ids: NDArray[np.int64], tracks: NDArray[np.int64]
 ) -> NDArray[np.int64]:
@@ -39,13 +40,6 @@ def inherited(
     known (M,), owner (M,): ids of the fragments then, and of their tracks. tracks (T,): ids of the present
     tracks. ids, known and tracks are in ascending order.
     """
-    return _inherited(known, owner, ids, tracks)
-
-
-@compiled("int64[::1], int64[::1], int64[::1], int64[::1]")
-def _inherited(
-    known: NDArray[np.int64], owner: NDArray[np.int64], ids: NDArray[np.int64], tracks: NDArray[np.int64]
-) -> NDArray[np.int64]:
     result = np.full(len(ids), -1, np.int64)
     for k in range(len(ids)):
         place = index_of(known, ids[k])

@@ -15,7 +15,7 @@ from vision.detection import Detection
 
 # Of a new track; about 0.1 x 0.1 m at 4 m with the camera of sim.yaml. Smaller parts come and go with noise.
 MIN_CELLS = 12
-_SIGMA_M = 0.2  # standard deviation of a first sighting: centre of the visible surface from that of the body
+FIRST_SIGMA_M = 0.2  # standard deviation of a first sighting: centre of the visible surface from the body's
 # A part above the robot's height at the side of the image begins a track if it has arrived and reaches down
 # below the height of a person.
 _ARRIVED_CELLS = 24  # minimum number of its cells that have arrived
@@ -61,7 +61,7 @@ def start_tracks(
     result = winner.copy()
     result[born] = np.arange(1, len(born) + 1) + len(tracks)
     position_m = detection.pose.apply(measured.position_m[born])
-    tracks.start(position_m, _SIGMA_M, max_speed_mps, 0.0, detection.captured_ns)
+    tracks.start(position_m, FIRST_SIGMA_M, max_speed_mps, 0.0, detection.captured_ns)
     tracks.overhead[-len(born) :] = overhead[born]
     return result
 

@@ -12,13 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from hal.types import Integers
+from vision.bodies.births import FIRST_SIGMA_M
 from vision.bodies.tracks import Tracks
 from vision.depth import regions
 from vision.depth.connected import IntGrid
 from vision.depth.regions import Regions
 from vision.detection import Detection
-
-_SIGMA_M = 0.2  # standard deviation of the position of a new track: of its visible surface from its body
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,9 +65,9 @@ def cut_out(
     measured = regions.measure(detection.grid, labels, known + len(cuts))
     evidence = np.array([cut.evidence for cut in cuts])
     position_m = detection.pose.apply(measured.position_m)
-    tracks.start(position_m[known:], _SIGMA_M, max_speed_mps, evidence, detection.captured_ns)
+    tracks.start(position_m[known:], FIRST_SIGMA_M, max_speed_mps, evidence, detection.captured_ns)
     tracks.border_is_guess[known:] = evidence > 0.0
     left = np.array([cut.left_by for cut in cuts if cut.left_by is not None], np.intp)
-    tracks.reset_position(left, position_m[left], np.tile(_SIGMA_M**2 * np.eye(3), (len(left), 1, 1)))
+    tracks.reset_position(left, position_m[left], np.tile(FIRST_SIGMA_M**2 * np.eye(3), (len(left), 1, 1)))
     tracks.trailing_m[left] = tracks.state[left, :3]
     return labels, measured

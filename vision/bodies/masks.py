@@ -132,13 +132,9 @@ def _predicted(
     return result
 
 
+@compiled("int32[:, ::1], int64[::1], int64")
 def count_cells(labels: IntGrid, cells: NDArray[np.intp], count: int) -> NDArray[np.intp]:
     """(count,) how many of the flat cells (K,) lie in each of the parts 1..count of labels (h, w)."""
-    return _counted(labels, cells, count)
-
-
-@compiled("int32[:, ::1], int64[::1], int64")
-def _counted(labels: IntGrid, cells: NDArray[np.intp], count: int) -> NDArray[np.intp]:
     flat, result = labels.ravel(), np.zeros(count, np.intp)
     for cell in cells:
         if flat[cell] > 0:

@@ -15,6 +15,10 @@ from vision.depth.connected import IntGrid
 from vision.depth.regions import Regions
 from vision.detection import Detection
 
+# Standard deviations of a second body, which begins with the position and the velocity of both: they are a
+# shoulder apart, and one of them may stand.
+_SIGMA_M, _SIGMA_MPS = 0.3, 1.0
+
 
 def regrouped(
     tracks: Tracks, detection: Detection, labels: IntGrid, measured: Regions, changes: Changes
@@ -37,7 +41,7 @@ def regrouped(
     visible = (may_be_two & (measured.cells > 0)).nonzero()[0]
     seconds = second_bodies(grid, labels, visible, changes.stayed, displacement_m)
     for number, (track, cells) in enumerate(seconds, start=len(tracks) + 1):
-        tracks.start_from(track, SUSPECT_EVIDENCE, detection.captured_ns)
+        tracks.start_from(track, _SIGMA_M, _SIGMA_MPS, SUSPECT_EVIDENCE, detection.captured_ns)
         labels = labels.copy()
         labels.ravel()[cells] = number
     return labels if gone or seconds else None

@@ -148,12 +148,12 @@ class Tracks:
                 new[...] = given[name]
             setattr(self, name, np.concatenate((old, new)))
 
-    def start_from(self, track: int, evidence: float, now_ns: int) -> None:
-        """Begin a track that was part of another one, with that one's velocity.
+    def start_from(self, track: int, sigma_m: float, sigma_mps: float, evidence: float, now_ns: int) -> None:
+        """Begin a track that was part of another one, with that one's position and velocity.
 
         It has to prove its motion by itself: it may be something static that the mover passes.
         """
-        self.start(self.state[track : track + 1, :3], 0.3, 1.0, evidence, now_ns)
+        self.start(self.state[track : track + 1, :3], sigma_m, sigma_mps, evidence, now_ns)
         self.state[-1, 3:] = self.state[track, 3:]
 
     def predict(self, dt_s: float, accel_density: float, up: FloatArray | None) -> None:

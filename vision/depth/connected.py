@@ -18,6 +18,9 @@ IntGrid = NDArray[np.int32]
 MIN_JUMP = 0.006  # 0.15 m at 5 m: a smaller step is noise
 MAX_JUMP = 0.03  # the depth of a body at 3 m: a larger step is a jump even on a slope
 _USUAL_STEPS = 12.0  # between the bounds, a jump is this many times the median step from cell to cell
+# What stands out of the floor is higher than the clearance by this many standard deviations of its height and
+# by an error of the tilt of half a degree.
+_HEIGHT_SIGMAS, _TILT_RAD = np.float32(3.0), np.float32(0.008)
 MIN_PART_CELLS = 6  # parts with fewer cells are speckles: wrong stereo matches
 
 
@@ -38,7 +41,7 @@ def _above_floor(
     result = np.empty(valid.shape, np.bool_)
     for i in range(valid.shape[0]):
         for j in range(valid.shape[1]):
-            margin_m = clearance_m + np.float32(3.0) * sigma_m[i, j] + np.float32(0.008) * depth_m[i, j]
+            margin_m = clearance_m + _HEIGHT_SIGMAS * sigma_m[i, j] + _TILT_RAD * depth_m[i, j]
             result[i, j] = valid[i, j] and height_m[i, j] > margin_m
     return result
 

@@ -25,6 +25,7 @@ _MIN_STRUCTURE = np.float32(3.0)  # minimum of either eigenvalue, at which an en
 _STAIRS = np.float32(0.05)  # share of the larger eigenvalue that a coarsely sampled edge adds to the smaller
 _MATCH_VARIANCE = np.float32(6.0**2)  # of grey levels between two images of the same patch
 _HALF = np.float32(0.5)
+_SAME_M, _SAME_SIGMAS = 0.05, 3.0  # of depth: the surface is uneven, and depth is noisy
 _PLACES = 5  # number of points along a segment, evenly from end to end, at which its depth is read
 
 
@@ -187,7 +188,7 @@ def _on_one_surface(near_m: FloatArray, floor_m: float, quadratic_per_m: float) 
         missing, jumps = 0, np.isnan(begin) or np.isnan(end)
         for place in range(1, _PLACES - 1):
             expected_m = 1.0 / (begin + (end - begin) * (place / (_PLACES - 1)))
-            gate_m = 0.05 + 3.0 * depth_sigma_of(expected_m, floor_m, quadratic_per_m)
+            gate_m = _SAME_M + _SAME_SIGMAS * depth_sigma_of(expected_m, floor_m, quadratic_per_m)
             if np.isnan(near_m[n, place]):
                 missing += 1
             elif not abs(near_m[n, place] - expected_m) <= gate_m:

@@ -30,7 +30,8 @@ _MAX_SAMPLES = 6.0  # length of the running mean in frames; _COMMON_NOISE is why
 # 5 (running mean in the long run).
 _SETTLED_LATE_FRAMES = 4.0
 _COMMON_NOISE = 0.5  # share of the depth noise that successive frames have in common: no mean reduces it
-_MIXED_SIGMAS = 3.0  # of depth, plus 0.1 m: if near and far differ by less, they are one surface
+_MIXED_M, _MIXED_SIGMAS = 0.1, 3.0  # the sum: if near and far differ by less, they are one surface
+_SAME_M, _SAME_SIGMAS = 0.05, 3.0  # the sum: a depth that is off by more is that of another surface
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -115,7 +116,7 @@ def _with_sigma(
             single = depth_sigma_of(near[k], noise.floor_m, noise.quadratic_per_m)
             # The noise of a mean over these frames, part of which they have in common.
             sigma[k] = single * max(1.0 / math.sqrt(max(anchor.depth_samples[k], 1.0)), _COMMON_NOISE)
-            mixed[k] = far[k] - near[k] > 0.1 + _MIXED_SIGMAS * single
+            mixed[k] = far[k] - near[k] > _MIXED_M + _MIXED_SIGMAS * single
     return near, sigma, far, known, mixed
 
 
@@ -154,8 +155,9 @@ def _averaged(
             predicted_m += pose.rotation[i, 2] * (there_m - pose.translation_m[i])
         fragment, end = k // 2, k % 2
         off_m = near_m[fragment, end] - predicted_m
+        sigma_m = depth_sigma_of(predicted_m, noise.floor_m, noise.quadratic_per_m)
         # False where either depth is missing (NaN).
-        if abs(off_m) <= 0.05 + 3.0 * depth_sigma_of(predicted_m, noise.floor_m, noise.quadratic_per_m):
+        if abs(off_m) <= _SAME_M + _SAME_SIGMAS * sigma_m:
             new_samples[fragment, end] = min(depth_samples[fragment, end] + 1.0, _MAX_SAMPLES)
             mean_m[fragment, end] = predicted_m + off_m / new_samples[fragment, end]
     return mean_m, new_samples

@@ -17,6 +17,7 @@ from vision.motion.velocities import STATIC_END_CHI2, EndResiduals
 _STATIC_FRAGMENT_CHI2 = 18.5  # 99.9 % of static fragments, 4 degrees of freedom
 _LONG_S = 0.26  # about the time window over which motion is measured
 _NEAR_M = 0.5  # maximum distance of neighbours; a chain of neighbours makes a group
+_UPRIGHT = 0.6  # a distance upwards counts for less, by this factor: bodies are taller than wide
 _VELOCITY_GATE_MPS = 0.5  # plus two sigmas: allows for limbs, which move differently from their body
 
 
@@ -66,7 +67,7 @@ def _alike(
 ) -> bool:
     """Whether two fragments are neighbours that move alike."""
     across_m = math.hypot(
-        position_m[one, 0] - position_m[other, 0], 0.6 * (position_m[one, 1] - position_m[other, 1])
+        position_m[one, 0] - position_m[other, 0], _UPRIGHT * (position_m[one, 1] - position_m[other, 1])
     )
     along_m = abs(position_m[one, 2] - position_m[other, 2])
     if not (across_m <= _NEAR_M and along_m <= _NEAR_M + (sigma_m[one] + sigma_m[other])):

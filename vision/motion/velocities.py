@@ -56,19 +56,15 @@ class EndResiduals:
     usable: Flags
 
 
+@compiled(EndResiduals, "float64[:]")
 def normal_equations(motion: EndResiduals, weight: FloatArray) -> FloatArray:
     """Normal equations of the weighted least squares for V, (12, N): one column per point.
 
     From the two image equations of each point, weighted by their covariance and weight (N,). Rows 0 to 5:
     entries 00, 01, 02, 11, 12, 22 of the symmetric matrix. Rows 6 to 8: right-hand side. Rows 9 to 11:
-    right-hand side for one sigma of a depth error common to all points of a body.
+    right-hand side for one sigma of a depth error common to all points of a body. Zero where weight is zero,
+    even if other inputs are NaN there.
     """
-    return _equations(motion, weight)
-
-
-@compiled(EndResiduals, "float64[:]")
-def _equations(motion: EndResiduals, weight: FloatArray) -> FloatArray:
-    """As normal_equations. Zero where weight is zero, even if other inputs are NaN there."""
     table = np.zeros((12, len(weight)))
     for k in range(len(weight)):
         if weight[k] == 0.0:
