@@ -16,7 +16,7 @@ from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import DepthGrid, nearest_cell
 from vision.depth.depth_noise import depth_sigma_of
 from vision.detection import Detection
-from vision.motion.candidates import long_static
+from vision.motion.moving_fragments import long_static
 from vision.numerics.order import index_of
 
 # Places where the label of a fragment's body is looked up: at these shares of its length; three of them above

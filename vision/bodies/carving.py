@@ -38,7 +38,7 @@ from vision.depth.depth_grid import BoolGrid, DepthGrid
 from vision.depth.depth_noise import depth_sigma_m, depth_sigma_of
 from vision.depth.regions import Regions
 from vision.detection import Detection
-from vision.motion import candidates
+from vision.motion import moving_fragments
 from vision.motion.least_squares import FragmentVelocities
 from vision.numerics.order import median
 from vision.scene import IMPLAUSIBLE_SPEED_FACTOR
@@ -71,7 +71,7 @@ def cuts(
     """
     if len(tracks) == 0:
         return []
-    suspicious = candidates.moving_candidates(detection.motion, detection.age_frames).nonzero()[0]
+    suspicious = moving_fragments.moving_candidates(detection.motion, detection.age_frames).nonzero()[0]
     if len(suspicious) == 0 and not changes.arrived.any():
         return []
     searched, overgrown = _may_hide_mover(tracks, measured, tracks.mover, config.depth_noise)
@@ -179,7 +179,7 @@ def _around_moving_fragments(
         motion.static_m, velocities.velocity_mps, velocities.covariance, chosen
     )
     sigma = depth_sigma_m(position[:, 2], config.depth_noise)
-    group = candidates.cluster(position, velocity, covariance, sigma)
+    group = moving_fragments.cluster(position, velocity, covariance, sigma)
     company = np.bincount(group)[group] >= _MIN_FRAGMENTS
     seen_s = detection.age_frames.take(chosen).astype(float) * detection.dt_s
     chosen = chosen[

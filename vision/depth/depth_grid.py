@@ -208,14 +208,14 @@ def _row(
     row: int,
     step: int,
     agree: np.float32,
-    into: NDArray[np.uint16],
+    out: NDArray[np.uint16],
 ) -> None:
-    """Put the raw depth of the blocks whose uppermost pixel row is row into into."""
-    for j in range(len(into)):
+    """Put the raw depth of the blocks whose uppermost pixel row is row into out."""
+    for j in range(len(out)):
         if step >= _FOUR_FROM_PX:
-            into[j] = _robust_of_four(depth, row, step * j, step // 4, step // 4 + step // 2, agree)
+            out[j] = _robust_of_four(depth, row, step * j, step // 4, step // 4 + step // 2, agree)
         else:
-            into[j] = depth[row + step // 2, step * j + step // 2]
+            out[j] = depth[row + step // 2, step * j + step // 2]
 
 
 @compiled("uint16[:, ::1], int64, float32, float32, float32")

@@ -25,7 +25,7 @@ _MIN_STRUCTURE = np.float32(3.0)  # minimum of either eigenvalue, at which an en
 _STAIRS = np.float32(0.05)  # share of the larger eigenvalue that a coarsely sampled edge adds to the smaller
 _MATCH_VARIANCE = np.float32(6.0**2)  # of grey levels between two images of the same patch
 _HALF = np.float32(0.5)
-_SAME_M, _SAME_SIGMAS = 0.05, 3.0  # of depth: the surface is uneven, and depth is noisy
+_SAME_M, _SAME_SIGMAS = 0.05, 3.0  # added, the gate on depth: the surface is uneven, and depth is noisy
 _PLACES = 5  # number of points along a segment, evenly from end to end, at which its depth is read
 
 

@@ -7,9 +7,9 @@ grey level is a weighted mean of four sums, for the windows at the four whole pi
 stay between the same pixels share these sums and take no pass over the window. OpenCV's function takes one in
 each iteration, and makes the gradient of the whole image first.
 
-Windows are flat arrays, row by row. A row is a multiple of 16 values, which the processor handles at a time;
-the gradient is 0 in what does not belong to the window. Offsets into windows are unsigned (np.uintp): the
-compiler then need not check for negative indices, and takes several values at once.
+Windows are flat arrays, row by row. A row takes stride values, a multiple of the 16 that the processor
+handles at a time; the gradient is 0 in what does not belong to the window. Offsets into windows are unsigned
+(np.uintp): the compiler then need not check for negative indices, and takes several values at once.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _OSCILLATION_PX = 0.01  # a step that takes back the one before, up to this, is 
 # It is low, so that straight edges pass: along the edge the expectation holds them (optical_flow.py).
 MIN_EIGENVALUE = 0.01
 _MIN_DETERMINANT = 0.125  # of the structure tensor, a sum over the window
-_ROW, _WINDOW = 16, 64  # a row is a multiple of the first, a window of the second
+_STRIDE, _WINDOW = 16, 64  # the stride is a multiple of the first, a window of the second
 _SHARE_BITS = 15  # of a number between 0 and 1
 _EIGHTHS, _EIGHTHS_BITS = 8.0, 3  # grey levels of the first window are in eighths
 # Scharr's filter (3, 10, 3) gives 32 times the gradient, and at most 16 times the largest grey level. A sum
@@ -42,66 +42,66 @@ _NEXT = np.uintp(1)
 
 
 @inlined
-def _load(image: GreyImage, top: int, left: int, rows: int, row: int, into: Values) -> None:
-    """Put rows of row pixels, from top and left on, into into. Beyond its border the image is mirrored."""
+def _load(image: GreyImage, top: int, left: int, rows: int, stride: int, out: Values) -> None:
+    """Put rows of stride pixels, from top and left on, into out. Beyond its border the image is mirrored."""
     height, width = image.shape
-    if top >= 0 and left >= 0 and top + rows <= height and left + row <= width:
+    if top >= 0 and left >= 0 and top + rows <= height and left + stride <= width:
         for i in range(rows):
-            for j in range(row):
-                into[i * row + j] = image[top + i, left + j]
+            for j in range(stride):
+                out[i * stride + j] = image[top + i, left + j]
         return
     for i in range(rows):
         v = abs(top + i)
         v = max(min(v, 2 * (height - 1) - v), 0)
-        for j in range(row):
+        for j in range(stride):
             u = abs(left + j)
-            into[i * row + j] = image[v, max(min(u, 2 * (width - 1) - u), 0)]
+            out[i * stride + j] = image[v, max(min(u, 2 * (width - 1) - u), 0)]
 
 
 @inlined
-def _blend(values: Values, step: np.uintp, share: float, bits: int, count: np.uintp, into: Values) -> None:
-    """Put values, interpolated with share towards those step farther on, times 2^bits, into into."""
+def _blend(values: Values, step: np.uintp, share: float, bits: int, count: np.uintp, out: Values) -> None:
+    """Put values, interpolated with share towards those step farther on, times 2^bits, into out."""
     far = np.int32(share * (1 << _SHARE_BITS))
     near, shift = np.int32((1 << _SHARE_BITS) - far), np.int32(_SHARE_BITS - bits)
     half = np.int32(1 << (shift - 1))
     for k in range(count):
         both = np.int32(near * np.int32(values[k])) + np.int32(far * np.int32(values[k + step]))
-        into[k] = np.int32(both + half) >> shift
+        out[k] = np.int32(both + half) >> shift
 
 
 @inlined
-def _smooth(values: Values, step: np.uintp, bits: int, count: np.uintp, into: Values) -> None:
-    """Put 3, 10, 3 times values, which are step apart, divided by 2^bits, into into."""
+def _smooth(values: Values, step: np.uintp, bits: int, count: np.uintp, out: Values) -> None:
+    """Put 3, 10, 3 times values, which are step apart, divided by 2^bits, into out."""
     half = (1 << bits) >> 1
     for k in range(count):
-        into[k] = (3 * (values[k] + values[k + step + step]) + 10 * values[k + step] + half) >> bits
+        out[k] = (3 * (values[k] + values[k + step + step]) + 10 * values[k + step] + half) >> bits
 
 
 @inlined
-def _differ(values: Values, step: np.uintp, bits: int, count: np.uintp, into: Values) -> None:
-    """Put the difference of values that are two steps apart, divided by 2^bits, into into."""
+def _differ(values: Values, step: np.uintp, bits: int, count: np.uintp, out: Values) -> None:
+    """Put the difference of values that are two steps apart, divided by 2^bits, into out."""
     half = (1 << bits) >> 1
     for k in range(count):
-        into[k] = (values[k + step + step] - values[k] + half) >> bits
+        out[k] = (values[k + step + step] - values[k] + half) >> bits
 
 
 @inlined
 def _interpolate(
-    values: Values, u: float, v: float, bits: int, row: int, count: int, work: Values, into: Values
+    values: Values, u: float, v: float, bits: int, stride: int, count: int, work: Values, out: Values
 ) -> None:
-    """Put values at u, v beyond each of count pixels, times 2^bits, into into. work: as long as values."""
-    down, wanted = np.uintp(row), np.uintp(count)
+    """Put values at u, v beyond each of count pixels, times 2^bits, into out. work: as long as values."""
+    down, wanted = np.uintp(stride), np.uintp(count)
     _blend(values, _NEXT, u, bits, wanted + down, work)
-    _blend(work, down, v, 0, wanted, into)
+    _blend(work, down, v, 0, wanted, out)
 
 
 @inlined
-def _scharr(values: Values, bits: int, row: int, count: int, work: Values, gx: Values, gy: Values) -> None:
+def _scharr(values: Values, bits: int, stride: int, count: int, work: Values, gx: Values, gy: Values) -> None:
     """Put Scharr's derivatives of values, divided by 2^bits, into gx and gy, for count pixels.
 
     values: from one column to the left and one row above these on. work: as long as values.
     """
-    down, wanted = np.uintp(row), np.uintp(count)
+    down, wanted = np.uintp(stride), np.uintp(count)
     _smooth(values, down, 0, wanted, work)
     _differ(work, _NEXT, bits, wanted, gx)
     _differ(values, down, 0, wanted, work)
@@ -110,13 +110,13 @@ def _scharr(values: Values, bits: int, row: int, count: int, work: Values, gx: V
 
 @inlined
 def _blank_outside(
-    top: int, left: int, rows: int, row: int, image: GreyImage, gx: Values, gy: Values
+    top: int, left: int, rows: int, stride: int, image: GreyImage, gx: Values, gy: Values
 ) -> None:
     """Set the derivatives gx, gy, in rows of pixels from top, left on, to 0 outside of image."""
     for i in range(rows):
-        for j in range(row):
+        for j in range(stride):
             if not (0 <= top + i < image.shape[0] and 0 <= left + j < image.shape[1]):
-                gx[i * row + j] = gy[i * row + j] = 0
+                gx[i * stride + j] = gy[i * stride + j] = 0
 
 
 @inlined
@@ -148,13 +148,13 @@ def _sum(gradient: Values, grey: Values, start: np.uintp, count: np.uintp) -> fl
 
 
 @inlined
-def _four_sums(gradient: Values, grey: Values, row: np.uintp, count: np.uintp) -> FourSums:
+def _four_sums(gradient: Values, grey: Values, stride: np.uintp, count: np.uintp) -> FourSums:
     """Sums of gradient times grey for the windows at four neighbouring pixels."""
     return (
         _sum(gradient, grey, np.uintp(0), count),
         _sum(gradient, grey, _NEXT, count),
-        _sum(gradient, grey, row, count),
-        _sum(gradient, grey, row + _NEXT, count),
+        _sum(gradient, grey, stride, count),
+        _sum(gradient, grey, stride + _NEXT, count),
     )
 
 
@@ -190,7 +190,7 @@ def _follow(
     u: float,
     v: float,
     side: int,
-    row: int,
+    stride: int,
     gx: Values,
     gy: Values,
     aim: tuple[float, float],
@@ -202,14 +202,14 @@ def _follow(
     gx, gy: of the window looked for. aim: the sums of its gradient times its grey levels. inverse: of its
     structure tensor, xx, xy, yy. patch: work space.
     """
-    down, window, left, top = np.uintp(row), np.uintp(len(gx)), 0, 0
+    down, window, left, top = np.uintp(stride), np.uintp(len(gx)), 0, 0
     last_u, last_v = math.inf, math.inf
     for iteration in range(ITERATIONS):
         if iteration == 0 or math.floor(u) != left or math.floor(v) != top:
             left, top = math.floor(u), math.floor(v)
             if not _in_reach(top, left, side, image):
                 return False, u, v
-            _load(image, top, left, side + 1, row, patch)
+            _load(image, top, left, side + 1, stride, patch)
             sums_x, sums_y = _four_sums(gx, patch, down, window), _four_sums(gy, patch, down, window)
         miss_x = aim[0] - _between(sums_x, u - left, v - top)
         miss_y = aim[1] - _between(sums_y, u - left, v - top)
@@ -237,33 +237,33 @@ def search(
     pixels (N, 2): the points; scale times that is in pixels of these images, as guess is. side: of the
     window, at most 41. A point whose window is plain, or out of the image, stays at its guess.
     """
-    row = -(-(side + 3) // _ROW) * _ROW
-    count = -(-side * row // _WINDOW) * _WINDOW
-    size = count + 4 * row
+    stride = -(-(side + 3) // _STRIDE) * _STRIDE
+    count = -(-side * stride // _WINDOW) * _WINDOW
+    size = count + 4 * stride
     patch, work, grey = np.zeros(size, np.int16), np.zeros(size, np.int16), np.zeros(size, np.int16)
     pixel_gx, pixel_gy = np.zeros(size, np.int16), np.zeros(size, np.int16)
     gx, gy, inside = np.zeros(count, np.int16), np.zeros(count, np.int16), np.zeros(count, np.int16)
     for i in range(side):
-        inside[i * row : i * row + side] = 1
+        inside[i * stride : i * stride + side] = 1
     there, found = guess.copy(), np.zeros(len(guess), np.bool_)
-    first, window, half = np.uintp(row + 1), np.uintp(count), 0.5 * (side - 1)
+    first, window, half = np.uintp(stride + 1), np.uintp(count), 0.5 * (side - 1)
     for n in range(len(pixels)):
         u, v = scale * pixels[n, 0] - half, scale * pixels[n, 1] - half
         left, top = math.floor(u), math.floor(v)
         if not _in_reach(top, left, side, before):
             continue
         u, v = u - left, v - top
-        _load(before, top - 1, left - 1, side + 3, row, patch)
-        _interpolate(patch, u, v, _EIGHTHS_BITS, row, count + 2 * row, work, grey)
+        _load(before, top - 1, left - 1, side + 3, stride, patch)
+        _interpolate(patch, u, v, _EIGHTHS_BITS, stride, count + 2 * stride, work, grey)
         if 0 <= top < before.shape[0] - side and 0 <= left < before.shape[1] - side:
-            _scharr(grey, _EIGHTHS_BITS, row, count, work, gx, gy)
+            _scharr(grey, _EIGHTHS_BITS, stride, count, work, gx, gy)
         else:
             # Only the derivatives at pixels of the image count. What is mirrored beyond them would move the
             # ends at the border by up to a tenth of a pixel.
-            _scharr(patch, 0, row, count + row, work, pixel_gx, pixel_gy)
-            _blank_outside(top, left, side + 1, row, before, pixel_gx, pixel_gy)
-            _interpolate(pixel_gx, u, v, 0, row, count, work, gx)
-            _interpolate(pixel_gy, u, v, 0, row, count, work, gy)
+            _scharr(patch, 0, stride, count + stride, work, pixel_gx, pixel_gy)
+            _blank_outside(top, left, side + 1, stride, before, pixel_gx, pixel_gy)
+            _interpolate(pixel_gx, u, v, 0, stride, count, work, gx)
+            _interpolate(pixel_gy, u, v, 0, stride, count, work, gy)
         _blank(inside, window, gx)
         _blank(inside, window, gy)
         usable, xx, xy, yy = _inverse(*_tensor(gx, gy, window), side)
@@ -271,7 +271,7 @@ def search(
             continue
         aim = _sum(gx, grey, first, window) / _EIGHTHS, _sum(gy, grey, first, window) / _EIGHTHS
         found[n], u, v = _follow(
-            now, guess[n, 0] - half, guess[n, 1] - half, side, row, gx, gy, aim, (xx, xy, yy), patch
+            now, guess[n, 0] - half, guess[n, 1] - half, side, stride, gx, gy, aim, (xx, xy, yy), patch
         )
         if found[n]:
             there[n, 0], there[n, 1] = u + half, v + half

@@ -90,8 +90,8 @@ def _gradient_products(
 
 
 @inlined
-def _sums(values: NDArray[np.int32], over_rows: NDArray[np.int32], into: NDArray[np.float32]) -> None:
-    """Put a quarter of the sums of values (15 * 16,) over 7x7 px into into (9 * 16,), at pixels within 4 px.
+def _sums(values: NDArray[np.int32], over_rows: NDArray[np.int32], out: NDArray[np.float32]) -> None:
+    """Put a quarter of the sums of values (15 * 16,) over 7x7 px into out (9 * 16,), at pixels within 4 px.
 
     Of the sixteen sums of a row the first nine are valid. over_rows (10 * 16,): work space. The sums are
     integers far below 2^24, so a quarter of them is exact in single precision.
@@ -105,7 +105,7 @@ def _sums(values: NDArray[np.int32], over_rows: NDArray[np.int32], into: NDArray
         total = 0
         for k in range(_WINDOW):
             total += over_rows[place + k]
-        into[place] = np.float32(0.25) * np.float32(np.int32(total))
+        out[place] = np.float32(0.25) * np.float32(np.int32(total))
 
 
 @inlined

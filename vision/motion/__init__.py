@@ -10,7 +10,7 @@ In track (vision/tracker.py):
 
 * velocities - the linear equations for the velocity of a point over ground (eqs. 6 to 9).
 * least_squares - velocities of fragments and of bodies from these equations.
-* candidates - which fragments move, which are static, and which move alike.
+* moving_fragments - which fragments move, which are static, and which move alike.
 * limbs - when to believe fragments of a body that disagree.
 * line_of_sight - velocities along and across the line of sight, in their own sigmas.
 """

@@ -30,8 +30,10 @@ _MAX_SAMPLES = 6.0  # length of the running mean in frames; _COMMON_NOISE is why
 # 5 (running mean in the long run).
 _SETTLED_LATE_FRAMES = 4.0
 _COMMON_NOISE = 0.5  # share of the depth noise that successive frames have in common: no mean reduces it
-_MIXED_M, _MIXED_SIGMAS = 0.1, 3.0  # the sum: if near and far differ by less, they are one surface
-_SAME_M, _SAME_SIGMAS = 0.05, 3.0  # the sum: a depth that is off by more is that of another surface
+# Gates, each the sum of metres and standard deviations of depth. If near and far differ by less than the
+# first, they are one surface. A depth that is off by more than the second is that of another surface.
+_MIXED_M, _MIXED_SIGMAS = 0.1, 3.0
+_SAME_M, _SAME_SIGMAS = 0.05, 3.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,7 +9,7 @@ import pytest
 
 from hal.types import FloatArray
 from vision.detection import no_motion
-from vision.motion.candidates import cluster, long_static, moving_candidates
+from vision.motion.moving_fragments import cluster, long_static, moving_candidates
 from vision.motion.velocities import EndResiduals
 
 
