@@ -30,7 +30,8 @@ from hal.types import CameraMount, Intrinsics, PlanarPose, RgbdFrame
 from sim.rendering.camera import SimulatedCamera
 from sim.world import World
 from tests.support.bags import small_bag
-from tests.support.fake_realsense import FakeRealsense, framesets
+from tests.support.fake_realsense import FakeRealsense
+from tests.support.fake_realsense_frames import framesets
 from tests.support.recordings import DESK_RPY, write_recording
 
 FRAMES = 5

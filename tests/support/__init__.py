@@ -24,6 +24,7 @@ Recordings and cameras:
 * recordings.py - small TUM folders
 * bags.py - small ROS bags, of ROS 1 and 2
 * fake_realsense.py - a stand-in for pyrealsense2 that follows a script, also a bad one
+* fake_realsense_frames.py - what it sends: frames, and samples of the gyro
 * software_realsense.py - librealsense's own software device behind the genuine pyrealsense2
 
 Chassis drivers with their emulators and links:

@@ -12,9 +12,7 @@ from rosbags import rosbag1, rosbag2
 from rosbags.rosbag2.enums import StoragePlugin
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from hal.cameras.bag_replay import BagReplay
 from hal.clocks import NS_PER_S
-from hal.errors import EndOfStream
 from hal.types import Intrinsics, RgbdFrame
 from tests.support.recordings import small_frame
 
@@ -189,16 +187,6 @@ def small_bag(folder: Path, bag_format: Format = "mcap", count: int = 4) -> Path
     return write_bag(
         folder, bag_format, lambda ros: camera_entries(ros, [small_frame(n) for n in range(count)])
     )
-
-
-def read_all(replay: BagReplay) -> list[RgbdFrame]:
-    frames = []
-    with replay:
-        while True:
-            try:
-                frames.append(replay.read(0.0))
-            except EndOfStream:
-                return frames
 
 
 def without(entries: list[Entry], *topics: str) -> list[Entry]:

@@ -26,11 +26,10 @@ from tests.support.bags import (
     Entry,
     Ros,
     camera_entries,
-    read_all,
     without,
     write_bag,
 )
-from tests.support.recordings import SMALL, START_NS, small_frame
+from tests.support.recordings import SMALL, START_NS, read_all, small_frame
 
 RECORDINGS = Path(__file__).resolve().parents[2] / "recordings"
 FRAMES = [small_frame(number) for number in range(4)]

@@ -24,12 +24,11 @@ from tests.support.bags import (
     Format,
     Ros,
     camera_entries,
-    read_all,
     small_bag,
     without,
     write_bag,
 )
-from tests.support.recordings import PERIOD_NS, SMALL, START_NS, small_frame
+from tests.support.recordings import PERIOD_NS, SMALL, START_NS, read_all, small_frame
 
 RECORDINGS = Path(__file__).resolve().parents[2] / "recordings"
 FRAMES = [small_frame(number) for number in range(4)]

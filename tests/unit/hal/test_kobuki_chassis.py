@@ -86,6 +86,8 @@ def test_docked_base_may_drive_off() -> None:
     bench = Bench()
     bench.emulator.charger = 2
     bench.arm()
+    assert bench.run(100, 0.4).mode is ChassisMode.ARMED
+    assert bench.plant.twist[0] == pytest.approx(0.4, abs=0.02)
 
 
 def test_over_current_is_told() -> None:

@@ -12,16 +12,8 @@ from hal.cameras.realsense import RealsenseCamera
 from hal.clocks import NS_PER_MS, SimulatedClock
 from hal.errors import DeviceNotFound, DeviceRefused, FrameTimeout, LinkLost
 from hal.types import Intrinsics
-from tests.support.fake_realsense import (
-    PERIOD_MS,
-    FakeDevice,
-    FakeFrameset,
-    FakeGyro,
-    FakeRealsense,
-    FakeStream,
-    frameset,
-    framesets,
-)
+from tests.support.fake_realsense import FakeDevice, FakeRealsense, FakeStream
+from tests.support.fake_realsense_frames import PERIOD_MS, FakeFrameset, FakeGyro, frameset, framesets
 
 LATENCY_S = 0.03
 

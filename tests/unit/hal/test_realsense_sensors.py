@@ -8,7 +8,8 @@ from config.camera import RealsenseCameraConfig
 from hal.cameras.realsense import RealsenseCamera
 from hal.clocks import SimulatedClock
 from hal.errors import DeviceRefused
-from tests.support.fake_realsense import FakeRealsense, framesets
+from tests.support.fake_realsense import FakeRealsense
+from tests.support.fake_realsense_frames import framesets
 
 
 def camera_with(**options: dict[str, float]) -> tuple[RealsenseCamera, FakeRealsense]:
