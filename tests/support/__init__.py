@@ -6,6 +6,7 @@ Made of known numbers, without images or devices:
 * campaign.py - missions in the plane
 * evaluation_cases.py - true objects, detections and images of the evaluation
 * floor_bodies.py - boxes on the floor, for the decision
+* sight_watch.py - a sight of a straight path, scene by scene
 * recall.py - the memory of bodies out of view, scene by scene
 * video_moments.py - a hall with a crossing person and a crate, for the video
 * judging.py - evidence of motion, and the verdict on it

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from tests.support.floor_bodies import box
-from tests.unit.controller.decision.test_sight import Watch, free
+from tests.support.sight_watch import Watch, free
 
 
 def before_a_truck(half_across_m: float) -> Watch:
