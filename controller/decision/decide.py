@@ -35,8 +35,6 @@ from controller.path.path import OnPath, Path
 from hal.clocks import NS_PER_S
 from hal.types import CameraMount
 
-__all__ = ["Action", "Decision", "DecisionMaker", "Reason"]
-
 # Emergency braking goes on until the speed exceeds what is allowed by no more than this.
 _EMERGENCY_EXIT_MPS = 0.05
 _AT_END_M = 0.02  # the robot is at its target

@@ -19,9 +19,6 @@ from hal.records import record
 ALONGSIDE_M = 0.1
 STANDING_MPS = 0.01  # the decision counts a slower robot as standing, by command and by measurement
 BACKWARDS_MPS = -0.05  # a smaller backward speed is noise of the odometry
-# A body that moves away from the path goes along with the robot only if its speed along the path is more than
-# this many times its sideways speed. Otherwise it is leaving the path.
-ALONG_TO_SIDE_RATIO = 2.0
 # Nothing corrects the expected place of a body out of view: while it is not seen, an error of this many
 # standard deviations of its velocity may add up.
 UNSEEN_ERROR_SIGMAS = 2.0

@@ -12,7 +12,7 @@ import numpy as np
 from config.decision import Prediction
 from controller.decision.bodies import Bodies
 from controller.decision.corridor import PathVelocities, Placed
-from controller.decision.limits import ALONG_TO_SIDE_RATIO, UNSEEN_ERROR_SIGMAS
+from controller.decision.limits import UNSEEN_ERROR_SIGMAS
 from controller.decision.watched import Watched
 from hal.compiled import compiled
 from hal.records import record
@@ -20,6 +20,9 @@ from hal.types import FloatArray, Vector
 
 # Least sideways speed that is assumed when a body's direction of motion is judged.
 _MIN_SIDEWAYS_MPS = 0.1
+# A body that moves away from the path goes along with the robot only if its speed along the path is more than
+# this many times its sideways speed. Otherwise it is leaving the path.
+_ALONG_TO_SIDE_RATIO = 2.0
 # A body that comes towards the robot and was seen for this long has seen the robot, too.
 _AWARE_AFTER_S = 1.0
 
@@ -73,8 +76,8 @@ def _manoeuvres(
         # Out of view it cannot be seen to keep its lane, so there it must come nearly straight.
         aslant_mps = max(abs(left_mps), _MIN_SIDEWAYS_MPS)
         outwards, beside = left_mps * placed.d_m[k, 0] > 0.0, placed.clearance_m[k, 0] > 0.0
-        unaware = along_mps > (ALONG_TO_SIDE_RATIO if outwards else 1.0) * aslant_mps
-        comes = along_mps < -(ALONG_TO_SIDE_RATIO if unseen_s > 0.0 else 1.0) * aslant_mps
+        unaware = along_mps > (_ALONG_TO_SIDE_RATIO if outwards else 1.0) * aslant_mps
+        comes = along_mps < -(_ALONG_TO_SIDE_RATIO if unseen_s > 0.0 else 1.0) * aslant_mps
         leaves = outwards and beside and not unaware
         if bodies.moving[k]:
             # A body that turns into the way also slows down along the path.

@@ -75,14 +75,6 @@ def stops(ramps: SpeedRamps, times_s: FloatArray) -> Stops:
     return Stops(distance, speed > _STOPPED_MPS)
 
 
-def count_safe_stops(stopping: Stops, s_m: float, reached: Reach, counts: NDArray[np.bool_]) -> int:
-    """How many of the stops, from the first one on, touch none of the bodies in the mask counts (N,).
-
-    The robot starts at s_m. Once it stands, being touched is no fault of its own.
-    """
-    return _first_that_touches(stopping, s_m, reached, counts)
-
-
 def last_stop_before_entry(stopping: Stops, reached: Reach) -> int:
     """Index of the last stop that ends before any body could be in the corridor at all; -1: none does."""
     return _last_stop_before_entry(stopping.moves, reached.inside)
@@ -129,8 +121,11 @@ def _grown(
 
 
 @compiled(Stops, "float64", Reach, "boolean[:]")
-def _first_that_touches(stopping: Stops, s_m: float, reached: Reach, counts: NDArray[np.bool_]) -> int:
-    """Index of the first of R stops that touches a body in counts (N,) while it moves; R: none."""
+def count_safe_stops(stopping: Stops, s_m: float, reached: Reach, counts: NDArray[np.bool_]) -> int:
+    """How many of the R stops, from the first one on, touch none of the bodies in the mask counts (N,).
+
+    The robot starts at s_m. Once it stands, being touched is no fault of its own.
+    """
     for i in range(len(stopping.moves)):
         for j in range(stopping.moves.shape[1]):
             if not stopping.moves[i, j]:

@@ -105,7 +105,8 @@ class SpeedLimits:
         """The limits from depth alone (adviser 1 of the module's list)."""
         sight = known.sight
         front_m = s_m + known.corridor.front_m
-        found = self._corner(sight.corners.nearest(front_m), front_m, motion)
+        corner = sight.corners.nearest(front_m)
+        found = [] if corner is None else [self._corner(corner, front_m, motion)]
         if math.isfinite(sight.surface_s_m):
             found.append(self._surface(known, sight.surface_s_m, s_m, motion))
         if known.lens.covered:
@@ -146,10 +147,8 @@ class SpeedLimits:
 
         return Limit(room.speed_mps, why)
 
-    def _corner(self, corner: BlindCorner | None, front_m: float, motion: Motion) -> list[Limit]:
+    def _corner(self, corner: BlindCorner, front_m: float, motion: Motion) -> Limit:
         """The limit for passing a blind corner: slow enough for whoever steps out."""
-        if corner is None:
-            return []
         ahead_m = corner.s_m - front_m
         slow_mps = self._config.sight.blind_corner_mps
         rolls_m = motion.v_mps * motion.latency_s
@@ -161,7 +160,7 @@ class SpeedLimits:
             sentence = f"a blind corner {left_m:.1f} m ahead, {corner.beside_m:.1f} m beside the way: "
             return Reason("corner", sentence + allowed_text(speed), distance_m=left_m)
 
-        return [Limit(speed, why)]
+        return Limit(speed, why)
 
 
 def _covered() -> Reason:

@@ -115,7 +115,7 @@ class StandingLimits:
             self._inside.difference_update(bodies.ids[~(near | bodies.moving)].tolist())
         rows = near.nonzero()[0]
         if len(rows):
-            stop_m = self._stop_distances(known, bodies, placed)
+            stop_m = self._stands_off_m(known, bodies, placed)
             fields = _columns(
                 rows,
                 placed.block_from_s_m,
@@ -155,7 +155,7 @@ class StandingLimits:
             clearance_m[row] = max(clearance_m[row], min(whole_m, outline.clearance_m))
         return clearance_m
 
-    def _stop_distances(self, known: WorldModel, bodies: Bodies, placed: Placed) -> FloatArray:
+    def _stands_off_m(self, known: WorldModel, bodies: Bodies, placed: Placed) -> FloatArray:
         """(N,) distance at which to stand before each body, so that it is still in view and seen to leave.
 
         Never less than the configured stop_m, even if a camera that looks down steeply would see it nearer.

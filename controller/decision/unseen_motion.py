@@ -64,6 +64,16 @@ def significant_component(velocity_mps: FloatArray, covariance: FloatArray, alon
 
 
 @inlined
+def leftward_variance(covariance: FloatArray, cos: float, sin: float) -> float:
+    """Variance of the component of a velocity to the left of a heading with this cosine and sine.
+
+    covariance (2, 2): of the velocity.
+    """
+    mixed = covariance[0, 1] + covariance[1, 0]
+    return float((covariance[0, 0] * sin - mixed * cos) * sin + covariance[1, 1] * cos * cos)
+
+
+@inlined
 def may_enter_way(bodies: Bodies, k: int, pose: PlanarPose) -> bool:
     """Whether body k may come into the robot's way.
 
@@ -158,8 +168,7 @@ def _unseen_or_approaching(bodies: Bodies, widest_half_m: FloatArray, pose: Plan
         out[k] = bodies.unseen_s[k] > 0.0
         left_m = (bodies.xy_m[k, 1] - pose.y_m) * cos - (bodies.xy_m[k, 0] - pose.x_m) * sin
         left_mps = bodies.measured_mps[k, 1] * cos - bodies.measured_mps[k, 0] * sin
-        spread = bodies.covariance[k]
-        variance = (spread[0, 0] * sin - (spread[0, 1] + spread[1, 0]) * cos) * sin + spread[1, 1] * cos * cos
+        variance = leftward_variance(bodies.covariance[k], cos, sin)
         sigmas, least_mps = _APPROACH_MIN_SIGMAS, _APPROACH_MIN_MPS
         if _PERSON_FROM_M <= bodies.top_m[k] <= _PERSON_TO_M:
             sigmas, least_mps = _PERSON_MIN_SIGMAS, _PERSON_MIN_MPS

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from controller.decision.bodies import Bodies
-from controller.decision.unseen_motion import significant_component
+from controller.decision.unseen_motion import leftward_variance, significant_component
 from controller.decision.view_edges import ViewEdges, beyond_edges
 from hal.compiled import compiled
 from hal.types import CameraMount, FloatArray, PlanarPose
@@ -38,12 +38,12 @@ def extrapolated(bodies: Bodies, dt_s: float, pose: PlanarPose, mount: CameraMou
     cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
     xy = np.empty(bodies.xy_m.shape)
     for k in range(len(xy)):
-        (vx, vy), spread = bodies.velocity_mps[k], bodies.covariance[k]
+        vx, vy = bodies.velocity_mps[k]
         dx, dy = bodies.xy_m[k, 0] - pose.x_m, bodies.xy_m[k, 1] - pose.y_m
         left, leftward_mps = dy * cos - dx * sin - mount.left_m, vy * cos - vx * sin
         side = -1.0 if left < 0.0 else 1.0
         ahead = dx * cos + dy * sin - mount.forward_m - bodies.half_view_m[k] > 0.0
-        variance = (spread[0, 0] * sin - (spread[0, 1] + spread[1, 0]) * cos) * sin + spread[1, 1] * cos * cos
+        variance = leftward_variance(bodies.covariance[k], cos, sin)
         past_m = 0.0
         if bodies.moving[k] and ahead and -side * leftward_mps > math.sqrt(variance):
             past_m = max(_MIN_AXIS_DISTANCE_M - side * (left + leftward_mps * dt_s), 0.0)

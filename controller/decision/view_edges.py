@@ -52,43 +52,10 @@ def assumed_free_m(near_m: float, floor_from_m: float) -> float:
     return max(near_m, min(floor_from_m, _MAX_ASSUMED_FREE_M))
 
 
-def beyond_edges(bodies: Bodies, near_face_m: FloatArray, height_m: float, edges: ViewEdges) -> BoolArray:
-    """(N,) which bodies are entirely below the view or entirely above it.
-
-    near_face_m (N,): distance of their near faces ahead of the camera. height_m: of the camera.
-    """
-    return _beyond_edges(bodies, near_face_m, height_m, edges)
-
-
-def out_of_view(
-    bodies: Bodies,
-    pose: PlanarPose,
-    mount: CameraMount,
-    edges: ViewEdges,
-    tolerance_m: float,
-    tolerance_mps: float,
-) -> BoolArray:
-    """(N,) which bodies are beside, below or above the view, and no farther than _BEHIND_M behind the camera.
-
-    pose: of the robot that carries the camera. A centre up to tolerance_m inside the side edge counts as
-    beside the view; of a mover, tolerance_mps more for each second since it was last seen.
-    """
-    return _out_of_view(bodies, pose, mount, edges, tolerance_m, tolerance_mps)
-
-
 def may_be_above_view_within_m(top_m: float, height_m: float, up_tan: float) -> float:
     """Distance ahead of the camera below which something with its top at top_m may rise above the view."""
     rise_m = top_m - height_m
     return max(rise_m, 0.0) / max(up_tan, MIN_TAN)
-
-
-def visible_from_m(bodies: Bodies, side_m: FloatArray, height_m: float, edges: ViewEdges) -> FloatArray:
-    """(N,) the least distance ahead of the camera at which a body is seen.
-
-    There its centre is within the side edges, its top is above the lower edge and its bottom is below the
-    upper edge. side_m (N,): sideways distance of its centre from the camera's axis. height_m: of the camera.
-    """
-    return _visible_from_m(bodies, side_m, height_m, edges)
 
 
 @inlined
@@ -112,8 +79,11 @@ def _beyond(near_face_m: float, bottom_m: float, top_m: float, height_m: float, 
 
 
 @compiled(Bodies, "float64[:], float64", ViewEdges)
-def _beyond_edges(bodies: Bodies, near_face_m: FloatArray, height_m: float, edges: ViewEdges) -> BoolArray:
-    """As beyond_edges()."""
+def beyond_edges(bodies: Bodies, near_face_m: FloatArray, height_m: float, edges: ViewEdges) -> BoolArray:
+    """(N,) which bodies are entirely below the view or entirely above it.
+
+    near_face_m (N,): distance of their near faces ahead of the camera. height_m: of the camera.
+    """
     beyond = np.empty(len(near_face_m), np.bool_)
     for k in range(len(near_face_m)):
         beyond[k] = _beyond(near_face_m[k], bodies.bottom_m[k], bodies.top_m[k], height_m, edges)
@@ -121,7 +91,7 @@ def _beyond_edges(bodies: Bodies, near_face_m: FloatArray, height_m: float, edge
 
 
 @compiled(Bodies, PlanarPose, CameraMount, ViewEdges, "float64, float64")
-def _out_of_view(
+def out_of_view(
     bodies: Bodies,
     pose: PlanarPose,
     mount: CameraMount,
@@ -129,7 +99,11 @@ def _out_of_view(
     tolerance_m: float,
     tolerance_mps: float,
 ) -> BoolArray:
-    """As out_of_view()."""
+    """(N,) which bodies are beside, below or above the view, and no farther than _BEHIND_M behind the camera.
+
+    pose: of the robot that carries the camera. A centre up to tolerance_m inside the side edge counts as
+    beside the view; of a mover, tolerance_mps more for each second since it was last seen.
+    """
     cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
     out = np.empty(len(bodies.xy_m), np.bool_)
     for k in range(len(out)):
@@ -144,8 +118,12 @@ def _out_of_view(
 
 
 @compiled(Bodies, "float64[:], float64", ViewEdges)
-def _visible_from_m(bodies: Bodies, side_m: FloatArray, height_m: float, edges: ViewEdges) -> FloatArray:
-    """As visible_from_m()."""
+def visible_from_m(bodies: Bodies, side_m: FloatArray, height_m: float, edges: ViewEdges) -> FloatArray:
+    """(N,) the least distance ahead of the camera at which a body is seen.
+
+    There its centre is within the side edges, its top is above the lower edge and its bottom is below the
+    upper edge. side_m (N,): sideways distance of its centre from the camera's axis. height_m: of the camera.
+    """
     visible = np.empty(len(side_m))
     for k in range(len(side_m)):
         lowest = min(max(1.0 - (bodies.top_m[k] - UNCERTAIN_M) / height_m, 0.0), 1.0)

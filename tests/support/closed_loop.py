@@ -12,7 +12,8 @@ import numpy as np
 from config.decision import DecisionConfig
 from config.path import ArcSpec, LineSpec, PathSpec
 from config.robot import Robot
-from controller.decision.decide import Action, Decision, DecisionMaker
+from controller.decision.decide import DecisionMaker
+from controller.decision.decision import Action, Decision
 from controller.decision.situation import Situation
 from controller.follow import PathFollower
 from controller.path.path import Path

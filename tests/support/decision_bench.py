@@ -9,7 +9,8 @@ import numpy as np
 from config.decision import DecisionConfig
 from config.path import LineSpec, PathSpec
 from config.robot import Robot
-from controller.decision.decide import Decision, DecisionMaker
+from controller.decision.decide import DecisionMaker
+from controller.decision.decision import Decision
 from controller.decision.situation import Situation
 from controller.path.path import OnPath, Path
 from hal.geometry import camera_in_floor

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from config.decision import DecisionConfig
-from controller.decision.decide import Action
+from controller.decision.decision import Action
 from tests.support.decision_bench import Bench, obstacle
 from tests.support.scenes import free_space
 from vision.scene import FreeSpace

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from controller.decision.decide import Action, Decision
+from controller.decision.decision import Action, Decision
 from controller.decision.situation import Situation
 from controller.path.path import OnPath
 from hal.types import PlanarPose

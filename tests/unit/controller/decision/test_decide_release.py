@@ -9,7 +9,7 @@ import pytest
 from config.decision import DecisionConfig
 from config.path import LineSpec, PathSpec, StartSpec
 from config.robot import Limits, Robot
-from controller.decision.decide import Action
+from controller.decision.decision import Action
 from controller.decision.situation import Situation
 from controller.path.path import OnPath, Path
 from hal.types import PlanarPose

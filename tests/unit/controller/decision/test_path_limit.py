@@ -6,7 +6,7 @@ import pytest
 
 from config.path import LineSpec, PathSpec
 from config.robot import Robot
-from controller.decision.decide import Action
+from controller.decision.decision import Action
 from controller.path.path import Path
 from tests.support.decision_bench import Bench
 
