@@ -24,7 +24,7 @@ from config.camera import SimulatedCameraConfig
 from config.chassis import CanLinkConfig
 from config.loader import CONFIG_DIR
 from controller.errors import UserError
-from controller.mission.result import MissionOptions
+from controller.mission.options import MissionOptions
 from controller.realtime.mission import drive_realtime
 from controller.realtime.service import handlers_kept
 from controller.terminal.console import Console

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import NoReturn
 
 import click
 
@@ -23,10 +23,8 @@ from controller.cli.options import (
     topic_options,
 )
 from controller.errors import INTERRUPTED, Interrupted, UserError
+from controller.mission.options import MissionOptions
 from hal.errors import HalError
-
-if TYPE_CHECKING:
-    from controller.mission.result import MissionOptions
 
 
 @click.group(cls=Group, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})

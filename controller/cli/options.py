@@ -13,6 +13,7 @@ import click
 from config.camera import OdometryChoice
 from config.chassis import CHASSIS_KINDS
 from config.loader import CONFIG_DIR
+from controller.mission.options import MissionOptions
 from controller.terminal.outlet import result_on_stdout
 
 
@@ -114,9 +115,6 @@ def mission_options(command: Callable[..., None]) -> Callable[..., None]:
 
     @wraps(command)
     def with_options(**given: Any) -> None:
-        # Imported here: `treadwatch --help` needs no NumPy.
-        from controller.mission.result import MissionOptions
-
         of_mission = {each.name: given.pop(each.name) for each in fields(MissionOptions)}
         command(MissionOptions(**of_mission), **given)
 

@@ -11,5 +11,5 @@
 * arcs.py - from (v, w) to an arc as path
 * arc_ahead.py - the arc that is looked along, and what is known of the way along it
 * ground.py - remembers the floor around the robot
-* surroundings.py - limits by the remembered floor: start of an arc, turn in place
+* ground_limits.py - limits by the remembered floor: start of an arc, turn in place
 """

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from config.app import AppConfig
 from config.governor import GovernorConfig
 from controller.base.localise import Localiser
 from controller.base.response_monitor import ResponseMonitor
 from controller.build import build_path
 from controller.governor.governor import SpeedGovernor
-from controller.governor.inbox import Inbox
 from controller.governor.loop import Commands, GovernorLoop
-from hal.api import Chassis, DatagramLink
+from hal.api import Chassis
 from hal.geometry import mount_of
 
 
@@ -34,8 +31,3 @@ def build_governor_loop(config: AppConfig, chassis: Chassis, commands: Commands)
     response = ResponseMonitor(config.decision.chassis_delay_s, config.robot.limits.max_speed_mps)
     localiser = Localiser(start, mount_of(config.robot))
     return GovernorLoop(build_governor(config), commands, localiser, chassis, response)
-
-
-def build_inbox(link: DatagramLink, config: GovernorConfig, warn: Callable[[str], None]) -> Inbox:
-    """The inbox for the messages of link. warn: called for the first dropped message of each kind."""
-    return Inbox(link, config, warn)

@@ -10,12 +10,13 @@ from controller.base.drive_lifecycle import Outcome
 from controller.build import open_commands
 from controller.control import ControlStep
 from controller.errors import UserError
-from controller.governor.build import build_governor_loop, build_inbox
+from controller.governor.build import build_governor_loop
 from controller.governor.inbox import Inbox
 from controller.governor.loop import GovernorLoop
 from controller.mission.command import with_overrides
+from controller.mission.options import MissionOptions
 from controller.mission.possible_world import require_possible_world
-from controller.mission.result import DriveResult, MissionOptions
+from controller.mission.result import DriveResult
 from controller.mission.scenario_faults import unused_faults_warning, with_scenario_faults
 from controller.realtime.rig import realtime_rig
 from controller.realtime.service import ServiceManager
@@ -69,7 +70,7 @@ def _govern(
         realtime_rig(config, runner, options) as rig,
         open_commands(config) as link,
     ):
-        inbox = build_inbox(link, governor, console.event)
+        inbox = Inbox(link, governor, console.event)
         loop = build_governor_loop(config, rig.chassis, inbox)
         setpoints = SetpointTally(config.robot.limits, 1.0 / runner.control_rate_hz)
         governing = Governing(

@@ -27,8 +27,8 @@ from controller.decision.surfaces import check_scan
 from controller.governor.arc_ahead import ArcAhead
 from controller.governor.arcs import Kind, MotionRequest, corner_m, driveable, stop_reason_of, understand
 from controller.governor.ground import GroundMemory
+from controller.governor.ground_limits import GroundLimits
 from controller.governor.request import Twist
-from controller.governor.surroundings import GroundLimits
 from controller.path.path import OnPath, Path
 from controller.shape import SpeedShaper
 from hal.types import CameraMount, PlanarPose

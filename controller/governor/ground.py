@@ -3,7 +3,7 @@
 On a path known beforehand, the camera sees the floor long before the robot is there
 (controller/decision/sight.py). A planner's arc begins below the camera's view, turns into floor beside the
 view, or sweeps all around the robot. That floor was seen earlier, from elsewhere. It is kept in a square grid
-around the robot. surroundings.py makes limits from it.
+around the robot. ground_limits.py makes limits from it.
 """
 
 from __future__ import annotations

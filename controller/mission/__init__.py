@@ -8,5 +8,6 @@ The files in the order in which they come into play:
 * short_arcs.py - warns of arcs whose angle was given in radians
 * close_by.py - warns of what stands too near to the path of a simulation
 * blind_bends.py - warns of bends that the camera cannot see round
-* result.py - the options of a drive; its result, added up from step to step
+* options.py - what it is told on the command line
+* result.py - its result, added up from step to step
 """

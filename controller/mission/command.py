@@ -22,8 +22,9 @@ from controller.errors import UserError
 from controller.lockstep import run_lockstep
 from controller.mission.blind_bends import blind_bend_warning
 from controller.mission.close_by import close_by_warning
+from controller.mission.options import MissionOptions
 from controller.mission.possible_world import require_possible_world
-from controller.mission.result import MissionOptions, MissionResult
+from controller.mission.result import MissionResult
 from controller.mission.scenario_faults import unused_faults_warning, with_scenario_faults
 from controller.mission.short_arcs import short_arc_warning
 from controller.realtime.mission import drive_realtime

@@ -1,10 +1,9 @@
-"""The options of a drive, and its result: what is added up from step to step."""
+"""The result of a drive: what is added up from step to step."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from pathlib import Path as FilePath
 
 from controller.base.drive_lifecycle import Outcome
 from controller.control import ControlLoop, ControlStep
@@ -20,19 +19,6 @@ from controller.record.tally import (
 )
 from hal.clocks import NS_PER_S
 from sim.simulation import Simulation
-
-
-@dataclass(frozen=True, slots=True)
-class MissionOptions:
-    """The command line of `treadwatch run`."""
-
-    config_path: FilePath
-    scenario: str | None = None
-    seed: int | None = None
-    observations: FilePath | None = None
-    video: FilePath | None = None
-    record: FilePath | None = None
-    quiet: bool = False
 
 
 @dataclass(kw_only=True)

@@ -6,7 +6,8 @@ from config.app import AppConfig, RealtimeRunner
 from config.chassis import AgilexChassisConfig, AnyChassisConfig, CanLinkConfig
 from controller.base.drive_lifecycle import Outcome
 from controller.build import build_control
-from controller.mission.result import MissionOptions, MissionResult
+from controller.mission.options import MissionOptions
+from controller.mission.result import MissionResult
 from controller.realtime.rig import realtime_rig
 from controller.record.tally import SetpointTally
 from controller.terminal.console import Console

@@ -44,6 +44,11 @@ class PerceptionLink:
             self.newest = arrived[-1]
         return arrived
 
+    def take_cut_off(self) -> list[str]:
+        """The reasons in cut_off, which is empty afterwards."""
+        reasons, self.cut_off = self.cut_off, []
+        return reasons
+
     def send(self, message: StepMessage) -> None:
         """Send the control step to perception; the message is dropped if the buffer is full."""
         if self.lost_reason is not None:

@@ -16,7 +16,7 @@ from controller.base.drive_lifecycle import DriveLifecycle, Outcome
 from controller.build import build_path, build_simulation, require_camera
 from controller.build_chassis import build_base
 from controller.control import Drive
-from controller.mission.result import MissionOptions
+from controller.mission.options import MissionOptions
 from controller.realtime.channel import Channel, channel_sockets
 from controller.realtime.perception_link import PerceptionLink
 from controller.realtime.perception_process import perceive_forever
@@ -100,9 +100,9 @@ class RealtimeRig:
 
     def _take_cut_off(self, link: PerceptionLink, console: Console, more: str) -> None:
         """Warn of the outputs that have ended since the last call."""
-        while link.cut_off:
-            self.cut_off.append(link.cut_off.pop(0))
-            console.warning(self.cut_off[-1] + more)
+        for reason in link.take_cut_off():
+            self.cut_off.append(reason)
+            console.warning(reason + more)
 
     def _told(
         self,

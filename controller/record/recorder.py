@@ -31,6 +31,8 @@ from hal.types import CameraMount, FloatArray, PlanarPose
 
 PATH_SHOWN_M = 12.0
 PATH_STEP_M = 0.25
+# (N, 2) in the body frame: the way of a robot that is shown to drive straight on, whatever its path.
+STRAIGHT_AHEAD_M = np.column_stack([np.linspace(0.0, 10.0, 41), np.zeros(41)])
 
 # Frame rate of the video of a drive in real time: two cores that also perceive encode no more in VP8.
 MAX_REAL_TIME_FPS = 10.0

@@ -24,7 +24,7 @@ from controller.errors import UserError
 from controller.path.path import OnPath, Path
 from controller.perceive import Look
 from controller.record.observations import STANDARD_OUTPUT
-from controller.record.recorder import RecordingOptions, open_recorder, require_two_files
+from controller.record.recorder import STRAIGHT_AHEAD_M, RecordingOptions, open_recorder, require_two_files
 from controller.record.tally import ConditionTally, TimingTally
 from controller.replay.build import build_replay_decision, build_replay_perceiver, replay_surroundings
 from controller.terminal.console import Console
@@ -110,7 +110,7 @@ def run_replay(options: ReplayOptions) -> None:
             v_mps = speed.step(look.scene.ego_motion)
             decision = _decide(decide, path, look, v_mps)
             tally.take(look, decision)
-            recorder.record(look, decision, measured_mps=v_mps, path_ahead_m=_AHEAD_M)
+            recorder.record(look, decision, measured_mps=v_mps, path_ahead_m=STRAIGHT_AHEAD_M)
             console.progress(tally.frames / source.frame_count, f"frame {tally.frames}/{source.frame_count}")
             console.decision((tally.last_ns - tally.first_ns) / NS_PER_S, decision, v_mps)
     prior = "none: the camera's motion is estimated from images and depth alone"
@@ -141,9 +141,6 @@ def recorded_mount(config: ReplayConfig, recorded: CameraMount | None) -> Camera
     if recorded is not None or not config.assume_mount:
         return recorded
     return mount_of(config.robot)
-
-
-_AHEAD_M = np.column_stack([np.linspace(0.0, 10.0, 41), np.zeros(41)])
 
 
 def _decide(decide: DecisionMaker, path: Path, look: Look, v_mps: float) -> Decision:

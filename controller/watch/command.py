@@ -20,7 +20,7 @@ from controller.build import (
 from controller.build_chassis import build_listener
 from controller.errors import UserError
 from controller.mission.command import with_overrides
-from controller.mission.result import MissionOptions
+from controller.mission.options import MissionOptions
 from controller.mission.scenario_faults import with_scenario_faults
 from controller.realtime.messages import STREAM_ENDED
 from controller.realtime.perception_link import PerceptionLink
@@ -146,6 +146,6 @@ def _open_base(
 
 def _take_cut_off(link: PerceptionLink, result: WatchResult, console: Console, more: str) -> None:
     """Warn of the outputs that have ended since the last call."""
-    while link.cut_off:
-        result.cut_off.append(link.cut_off.pop(0))
-        console.warning(result.cut_off[-1] + more)
+    for reason in link.take_cut_off():
+        result.cut_off.append(reason)
+        console.warning(reason + more)

@@ -8,14 +8,13 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from controller.base.drive_lifecycle import Outcome
 from controller.base.ego_speed import EgoSpeed
 from controller.base.localise import Localiser
 from controller.control import ControlStep, Decides
 from controller.decision.situation import Situation
 from controller.path.path import OnPath, Path
+from controller.record.recorder import STRAIGHT_AHEAD_M
 from hal.api import ChassisListener
 from hal.clocks import NS_PER_S
 from hal.types import PlanarPose, Setpoint
@@ -24,7 +23,6 @@ from vision.scene import Scene
 # As in a replay, the robot is at the start of a straight path in every step, wherever it is pushed.
 _HERE = PlanarPose(0.0, 0.0, 0.0)
 _AT_START = OnPath(0.0, 0.0, 0.0)
-_AHEAD_M = np.column_stack([np.linspace(0.0, 10.0, 41), np.zeros(41)])
 
 # The camera's process imports, compiles (at its first start) and opens the camera in this time.
 _FIRST_FRAME_S = 180.0
@@ -84,7 +82,7 @@ class WatchLoop:
         self._end_when_due(now_ns)
         nothing = Setpoint(now_ns, math.nan, math.nan, math.nan)
         return ControlStep(
-            now_ns, _HERE, 0.0, 0.0, self._scene_ns, decision, nothing, state, ahead_m=_AHEAD_M
+            now_ns, _HERE, 0.0, 0.0, self._scene_ns, decision, nothing, state, ahead_m=STRAIGHT_AHEAD_M
         )
 
     def _take(self, scene: Scene, now_ns: int) -> None:

@@ -11,7 +11,7 @@ from config.app import AppConfig, load_app
 from config.loader import CONFIG_DIR
 from controller.mission.blind_bends import blind_bend_warning, view_of
 from controller.mission.command import run_mission
-from controller.mission.result import MissionOptions
+from controller.mission.options import MissionOptions
 
 SCENARIOS = sorted((CONFIG_DIR / "scenarios").glob("*.yaml"))
 ROBOTS = sorted(CONFIG_DIR.glob("robot-*.yaml"))

@@ -10,8 +10,8 @@ from config.app import load_app
 from config.loader import CONFIG_DIR, ConfigError
 from config.scenario import scenario_names
 from controller.mission.command import run_mission
+from controller.mission.options import MissionOptions
 from controller.mission.possible_world import require_possible_world
-from controller.mission.result import MissionOptions
 
 SIM = CONFIG_DIR / "sim.yaml"
 OURS = sorted((Path(__file__).resolve().parents[3] / "scenarios").glob("*.yaml"))

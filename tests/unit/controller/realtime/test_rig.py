@@ -15,7 +15,7 @@ from config.loader import CONFIG_DIR
 from controller.base.drive_lifecycle import Outcome
 from controller.build import build_control
 from controller.control import ControlLoop
-from controller.mission.result import MissionOptions
+from controller.mission.options import MissionOptions
 from controller.realtime import rig as realtime_rig
 from controller.realtime.channel import Channel, PeerGone, channel_sockets
 from controller.realtime.messages import CutOff

@@ -15,7 +15,7 @@ import yaml
 
 from config.loader import CONFIG_DIR
 from controller.mission.command import run_mission
-from controller.mission.result import MissionOptions
+from controller.mission.options import MissionOptions
 from controller.record.frame_recorder import FrameRecorder
 from controller.replay.command import ReplayOptions, run_replay
 from hal.cameras.pose_file import open_odometry

@@ -1,0 +1,19 @@
+"""The options that all drives have in common."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True, slots=True)
+class MissionOptions:
+    """What `treadwatch run`, `govern` and `watch` are told on the command line."""
+
+    config_path: Path
+    scenario: str | None = None
+    seed: int | None = None
+    observations: Path | None = None
+    video: Path | None = None
+    record: Path | None = None
+    quiet: bool = False
