@@ -63,7 +63,7 @@ def run_campaign(options: CampaignOptions) -> int:
     _check(options, config)
     own = load_own(options.scenarios, config)
     if options.only is not None:
-        return _run_one(options, config, _parse_mission(options.only, own, options, config))
+        return _run_one(options, config, _parse_mission(options.only, own, config))
     assert options.report is not None
     families = (options.families or (() if own else FAMILY_NAMES)) + tuple(own)
     policies = options.policies or POLICY_NAMES
@@ -150,7 +150,7 @@ def _check_modes(options: CampaignOptions, store: MissionStore) -> None:
 
 
 def _parse_mission(
-    text: str, own: dict[str, OwnScenario], options: CampaignOptions, config: AppConfig
+    text: str, own: dict[str, OwnScenario], config: AppConfig
 ) -> tuple[Mission, Scenario | None]:
     """The mission of --only, and its world where it is a scenario file. Raises ConfigError, UserError."""
     family, _, seed = text.rpartition(":")

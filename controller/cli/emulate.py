@@ -128,8 +128,8 @@ def can_link(link: CanLinkConfig, options: EmulateOptions) -> CanLinkConfig:
     values = {key: getattr(link, key) for key in link.model_fields_set}
     if options.channel is not None and options.interface is None and options.channel != link.channel:
         # can0, vcan0: socketcan; a group address: multicast.
-        options_interface = "udp_multicast" if "." in options.channel else "socketcan"
-        values = {"interface": options_interface} | ({"port": link.port} if "." in options.channel else {})
+        implied = "udp_multicast" if "." in options.channel else "socketcan"
+        values = {"interface": implied} | ({"port": link.port} if "." in options.channel else {})
     elif options.interface is not None:
         values = {"interface": options.interface, "channel": link.channel}
     values |= {} if options.channel is None else {"channel": options.channel}

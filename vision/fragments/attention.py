@@ -44,9 +44,7 @@ _MIN_EIGENVALUE = 600.0
 # with it the velocities were not known any better.
 _CONTRAST = 60.0
 _CANDIDATES = 48  # only the longest segments: bounds the time of one look
-_MAX_CORNER_AREA_PX = (
-    40_000  # of the image around a body: larger ones are near, and their surface is known well
-)
+_MAX_CORNER_AREA_PX = 40_000  # of the image around a body: larger ones are near, their surface is well known
 _AT_ONCE = 4  # maximum per look: takes a body from none to enough, and leaves room for other bodies
 _ONE_SURFACE = 0.5  # maximum distance of near and far surface at an end, as a share of the gate
 _HOLES = 0.2  # of the 25 samples around an end: from 0.25 on there may be another surface (depth_mask.py)
