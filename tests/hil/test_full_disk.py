@@ -7,7 +7,7 @@ from pathlib import Path
 
 from config.loader import CONFIG_DIR
 from hal.cameras.tum_replay import TumReplay
-from tests.hil.test_perception_killed import perception_of
+from tests.support.drive_process import perception_of
 
 SCENARIO = Path(__file__).resolve().parents[1] / "scenarios" / "short_crossing.yaml"
 

@@ -7,16 +7,9 @@ import sys
 from pathlib import Path
 
 from config.loader import CONFIG_DIR
+from tests.support.drive_process import perception_of
 
 SCENARIO = Path(__file__).resolve().parents[1] / "scenarios" / "long_aisle.yaml"
-
-
-def perception_of(process: subprocess.Popen[str]) -> int:
-    """The child that runs the camera; the other child only tracks resources."""
-    children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
-    found = [int(pid) for pid in children if "spawn_main" in Path(f"/proc/{pid}/cmdline").read_text()]
-    assert len(found) == 1
-    return found[0]
 
 
 def test_the_robot_stops_within_its_limits_and_says_why() -> None:

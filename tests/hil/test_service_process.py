@@ -8,16 +8,9 @@ import sys
 from pathlib import Path
 
 from config.loader import CONFIG_DIR
+from tests.support.drive_process import next_notice
 
 SCENARIO = Path(__file__).resolve().parents[1] / "scenarios" / "long_aisle.yaml"
-
-
-def next_notice(receiver: socket.socket, wanted: bytes) -> bytes:
-    """The first notice that begins with wanted; others are passed over. Times out with the socket."""
-    while True:
-        notice = receiver.recv(500)
-        if notice.startswith(wanted):
-            return notice
 
 
 def test_ready_watchdog_stopping_and_a_clean_end(tmp_path: Path) -> None:

@@ -16,8 +16,7 @@ import pytest
 import yaml
 
 from config.loader import CONFIG_DIR
-from tests.hil.test_perception_killed import perception_of
-from tests.hil.test_service_process import next_notice
+from tests.support.drive_process import next_notice, perception_of
 
 SCENARIO = Path(__file__).resolve().parents[1] / "scenarios" / "short_crossing.yaml"
 

@@ -17,6 +17,7 @@ Depth and images:
 
 * grids.py - depth grids made of planes and plates
 * detections.py - detections without fragments, on exact depth grids
+* walker.py - a plate that walks past, and what is found moving
 * painted.py - RGB-D frames painted from textured rectangles
 * painted_room.py - a painted room, and a crate to put into it
 
@@ -49,10 +50,13 @@ Chassis for tests of what drives them:
 Drives and decisions:
 
 * decision_bench.py - a decision maker, and obstacles to show it
+* path_drive.py - a control loop on a straight path, step by step
 * closed_loop.py - a mission without a renderer: moving boxes, a noisy camera, a chassis with lag
 * governed_drive.py - the same with the speed governor and a planner
+* governor_rig.py - the governor's loop with a planner by the time and an obedient base
 * runner_doubles.py - test doubles of what the runners step
 * hil_missions.py - short missions with the emulator as a process of its own
+* drive_process.py - what a test asks of a drive that runs as a process of its own
 
 Command line and pages:
 

@@ -9,29 +9,13 @@ import pytest
 
 from config.perception import PerceptionConfig
 from hal.types import FloatArray, Pose
-from tests.support.detections import AT_ORIGIN, FRAME_NS, detection, no_ends, track
+from tests.support.detections import AT_ORIGIN, detection, no_ends, track
 from tests.support.grids import CAMERA, grid_of, nearest, no_depth, plate, wall
+from tests.support.walker import FRAME_S, SPEED_MPS, moving, walker, way_m
 from vision.detection import no_motion
 from vision.motion.velocities import EndResiduals
 from vision.percept import Percept
-from vision.scene import Obstacle
 from vision.tracker import Tracker
-
-FRAME_S = FRAME_NS * 1e-9
-SPEED_MPS = 0.8
-
-
-def moving(percept: Percept) -> list[Obstacle]:
-    return [one for one in percept.scene.obstacles if one.moving]
-
-
-def way_m(frame: int) -> float:
-    return SPEED_MPS * frame * FRAME_S
-
-
-def walker(x_m: float, depth_m: float = 4.0) -> FloatArray:
-    """0.5 m wide, 1.6 m high."""
-    return plate(depth_m, (x_m - 0.25, x_m + 0.25), (-0.6, 1.0))
 
 
 def test_a_surface_alone_is_found_moving_with_its_velocity() -> None:

@@ -12,7 +12,7 @@ from config.perception import PerceptionConfig
 from hal.types import FloatArray
 from tests.support.detections import detection, track
 from tests.support.grids import grid_of, nearest, plate, wall
-from tests.unit.vision.test_tracker import moving, walker, way_m
+from tests.support.walker import moving, walker, way_m
 from vision.bodies import votes
 from vision.tracker import Tracker
 

@@ -16,10 +16,10 @@ from controller.base.response_monitor import ResponseMonitor
 from controller.control import ControlStep
 from hal.geometry import camera_in_body
 from hal.types import Pose, Setpoint
+from tests.support.governor_rig import Rig
 from tests.support.obedient_chassis import PERIOD_S, ObedientChassis
+from tests.support.path_drive import MOUNT, PERIOD_NS, loop_on
 from tests.support.scenes import ORIGIN, scene
-from tests.unit.controller.governor.test_loop import Rig
-from tests.unit.controller.test_control import MOUNT, PERIOD_NS, loop_on
 from vision.scene import EgoMotion, Scene
 
 FRAME_S = 1.0 / 30.0

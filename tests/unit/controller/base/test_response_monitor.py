@@ -13,7 +13,7 @@ from controller.control import ControlStep
 from controller.record.tally import SetpointTally
 from tests.support.imperfect_base import ImperfectBase
 from tests.support.obedient_chassis import PERIOD_S
-from tests.unit.controller.test_control import drive, loop_on
+from tests.support.path_drive import drive, loop_on
 
 LIMITS = Robot().limits
 

@@ -14,7 +14,7 @@ from config.perception import PerceptionConfig
 from hal.types import FloatArray
 from tests.support.detections import detection, track
 from tests.support.grids import grid_of, labelled, nearest, no_depth, plate, wall
-from tests.unit.vision.test_tracker import moving, walker, way_m
+from tests.support.walker import moving, walker, way_m
 from vision.bodies import left_behind
 from vision.bodies.arrivals import ViewMemory
 from vision.bodies.cutting import cut_out
