@@ -7,7 +7,7 @@ import sys
 import time
 from collections.abc import Generator
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import click
@@ -72,16 +72,14 @@ def run_campaign(options: CampaignOptions) -> int:
     _check_modes(options, store)
     keep_own(options.report, own, {row.family for row in store.rows.values()})
     keep = options.report / FAILING if options.video else None
-    tasks = []
     named = list(missions(options.missions, families, options.seed))
+    tasks = []
     for mission in named:
-        missing_policies = tuple(
-            name for name in policies if (mission.family, mission.seed, name) not in store.rows
-        )
-        if missing_policies:
+        to_drive = tuple(name for name in policies if (mission.family, mission.seed, name) not in store.rows)
+        if to_drive:
             world = own[mission.family].scenario if mission.family in own else None
-            task = Task(mission.family, mission.seed, missing_policies, options.mode, config, keep)
-            tasks.append(replace(task, scenario=world))
+            task = Task(mission.family, mission.seed, to_drive, options.mode, config, keep, scenario=world)
+            tasks.append(task)
     began_s = time.perf_counter()
     try:
         _run_all(options, tasks, store)
@@ -93,6 +91,11 @@ def run_campaign(options: CampaignOptions) -> int:
         options.report, store.rows.values(), command_line(options), kept_scenarios(options.report)
     )
     _print_summary(summary, len(tasks), time.perf_counter() - began_s, options.report)
+    _note_earlier(store, named)
+    return int(any(failed(row) for row in store.rows.values() if row.policy == OURS))
+
+
+def _note_earlier(store: MissionStore, named: list[Mission]) -> None:
     earlier = {(row.family, row.seed) for row in store.rows.values()}
     earlier -= {(mission.family, mission.seed) for mission in named}
     if earlier:
@@ -100,7 +103,6 @@ def run_campaign(options: CampaignOptions) -> int:
             f"note     the folder holds {len(earlier)} missions more than this command asks for; "
             "they are in the report, too"
         )
-    return int(any(failed(row) for row in store.rows.values() if row.policy == OURS))
 
 
 def _run_all(options: CampaignOptions, tasks: list[Task], store: MissionStore) -> None:
@@ -173,8 +175,10 @@ def _run_one(options: CampaignOptions, config: AppConfig, to_drive: tuple[Missio
     keep = None
     if options.video:
         keep = (options.report or Path("out")) / f"{mission.family}-{mission.seed}"
-    task = Task(mission.family, mission.seed, policies, options.mode, config, keep, keep_all=True)
-    rows = run_task(replace(task, scenario=scenario))
+    task = Task(
+        mission.family, mission.seed, policies, options.mode, config, keep, keep_all=True, scenario=scenario
+    )
+    rows = run_task(task)
     for row in rows:
         say(format_row(row))
     if keep is not None:
