@@ -126,18 +126,26 @@ def _score_frame(
     matched_rows = {row for row, _ in pairs}
     matched_ids = {hit.object_id for hit in hits}
     unmatched = [detection for row, detection in enumerate(detections) if row not in matched_rows]
-    is_moving = [bool(row.any()) for row in np.isfinite(costs(unmatched, eligible))]
-    may_move = [bool(row.any()) for row in np.isfinite(costs(unmatched, excused))]
     missed = tuple(true.id for true in eligible if true.id not in matched_ids)
+    wrong: list[int] = []
+    duplicates: list[int] = []
+    for detection, is_moving, may_move in zip(
+        unmatched, _lie_on(unmatched, eligible), _lie_on(unmatched, excused), strict=True
+    ):
+        if not may_move:
+            (duplicates if is_moving else wrong).append(detection.id)
     return FrameScore(
-        hits,
-        missed,
-        tuple(identity for identity in missed if verdicts[identity].settled),
-        tuple(
-            d.id for d, is_, may in zip(unmatched, is_moving, may_move, strict=True) if not is_ and not may
-        ),
-        tuple(d.id for d, is_, may in zip(unmatched, is_moving, may_move, strict=True) if is_ and not may),
+        hits=hits,
+        missed=missed,
+        missed_settled=tuple(identity for identity in missed if verdicts[identity].settled),
+        wrong=tuple(wrong),
+        duplicates=tuple(duplicates),
     )
+
+
+def _lie_on(detections: list[DetectedObject], objects: list[TrueObject]) -> list[bool]:
+    """Which detections could be matched to any of the objects."""
+    return [bool(row.any()) for row in np.isfinite(costs(detections, objects))]
 
 
 def _hit(detection: DetectedObject, true: TrueObject, verdicts: dict[int, Verdict]) -> Hit:
