@@ -22,15 +22,24 @@ _HIDDEN_M = 1.0
 # A corner farther inside the edge of the view than this is seen: a distance, and a share of the view's half
 # width, because depth is often missing in the outermost columns.
 _INSIDE_M, _INSIDE_SHARE = 0.1, 0.1
+# It does not extend nearer to the robot's front than this: more than the robot drives between exposure and
+# decision, plus ALONGSIDE_M (controller/decision/limits.py). Else it would count as something that the front
+# has passed, and the robot would stop braking for it.
+_LEAST_AHEAD_M = 0.3
 # What comes in slower than this, or rather along the view than across it, is seen in time.
 _MIN_INWARDS_MPS = 0.3
 
 
-def with_hidden_near_sides(boxes: Bodies, pose: PlanarPose, mount: CameraMount, edges: ViewEdges) -> Bodies:
-    """The boxes, those of movers that come in over the edge of the view extended towards the robot."""
+def with_hidden_near_sides(
+    boxes: Bodies, pose: PlanarPose, mount: CameraMount, front_m: float, edges: ViewEdges
+) -> Bodies:
+    """The boxes, those of movers that come in over the edge of the view extended towards the robot.
+
+    front_m: from the robot's turning centre to its foremost point.
+    """
     if not np.count_nonzero(boxes.moving):
         return boxes
-    hidden_m = _hidden(boxes, pose, mount, edges)
+    hidden_m = _hidden(boxes, pose, mount, edges, max(front_m - mount.forward_m + _LEAST_AHEAD_M, 0.0))
     if not np.count_nonzero(hidden_m):
         return boxes
     backwards = np.array([-math.cos(pose.heading_rad), -math.sin(pose.heading_rad)])
@@ -38,9 +47,11 @@ def with_hidden_near_sides(boxes: Bodies, pose: PlanarPose, mount: CameraMount, 
     return replace(boxes, xy_m=xy_m, half_view_m=boxes.half_view_m + 0.5 * hidden_m)
 
 
-@compiled(Bodies, PlanarPose, CameraMount, ViewEdges)
-def _hidden(bodies: Bodies, pose: PlanarPose, mount: CameraMount, edges: ViewEdges) -> FloatArray:
-    """(N,) by how much the bodies may extend nearer than their boxes, at most to the camera."""
+@compiled(Bodies, PlanarPose, CameraMount, ViewEdges, "float64")
+def _hidden(
+    bodies: Bodies, pose: PlanarPose, mount: CameraMount, edges: ViewEdges, least_m: float
+) -> FloatArray:
+    """(N,) by how much the bodies may extend nearer than their boxes, at most to least_m from the camera."""
     cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
     hidden_m = np.zeros(len(bodies.moving))
     for k in range(len(hidden_m)):
@@ -52,6 +63,6 @@ def _hidden(bodies: Bodies, pose: PlanarPose, mount: CameraMount, edges: ViewEdg
         inner_m = abs(left_m) - bodies.half_across_m[k]
         on_edge = inner_m >= (1.0 - _INSIDE_SHARE) * edges.edge_tan * near_m - _INSIDE_M
         comes_in = inwards_mps > max(along_mps, _MIN_INWARDS_MPS)
-        if bodies.moving[k] and near_m > 0.0 and on_edge and comes_in:
-            hidden_m[k] = min(_HIDDEN_M, near_m)
+        if bodies.moving[k] and near_m > least_m and on_edge and comes_in:
+            hidden_m[k] = min(_HIDDEN_M, near_m - least_m)
     return hidden_m

@@ -183,7 +183,8 @@ class WorldModel:
         boxes = self._out_of_view.mark_leaving_movers(boxes, pose, edges)
         standing = v_mps <= STANDING_MPS
         remembered = self._out_of_view.update(self._boxes, boxes, pose, edges, standing, free)
-        self.bodies = with_hidden_near_sides(boxes, pose, self._mount, edges).joined(remembered)
+        extended = with_hidden_near_sides(boxes, pose, self._mount, self.corridor.front_m, edges)
+        self.bodies = extended.joined(remembered)
         self._boxes, self._seen, self._boxed, self._unboxed = boxes, seen, boxed, None
         self.lens.look(free, self.corridor.half_width_at(s_m), self._mount.left_m)
         self.sight.look(free, surfaces, pose, s_m, scene.captured_ns, boxes, standing)
