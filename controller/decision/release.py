@@ -18,6 +18,9 @@ from hal.clocks import NS_PER_S
 # _AGAIN_S must have been out of sight for _GONE_S before the robot starts.
 _AGAIN_S = 5.0
 _GONE_S = 1.0
+# Once the robot has not slowed down for so long, a small gain is no nervousness any more. Without it, the
+# robot would stay below its speed for the rest of the way.
+_SETTLED_S = 4.0
 
 
 class StartDelay:
@@ -74,7 +77,8 @@ class ReleaseGate:
     (far_mps), that one is used: before the difference is driven, there is time to look again. Not from rest:
     whoever comes into view right before the nose needs about delay_s to become known, and people follow each
     other. After a change from faster to slower, the next increase comes no sooner than hold_s later, and then
-    only for a gain of worth_mps: within hold_s the speed changes its direction at most twice.
+    only for a gain of worth_mps: within hold_s the speed changes its direction at most twice. A robot that
+    stands, or has not slowed down for _SETTLED_S, takes any gain: a slow section may allow no greater one.
     """
 
     def __init__(self, config: Release) -> None:
@@ -83,6 +87,7 @@ class ReleaseGate:
         self._rising = True
         self._increasing = True
         self._turned_ns: int | None = None
+        self._slowed_ns: int | None = None
         self._delayed_min, self._recent_min = _RunningMin(config.delay_s), _RunningMin(config.far_delay_s)
 
     def step(
@@ -107,7 +112,7 @@ class ReleaseGate:
         elif min_mps > self._held_mps:
             self._raise(min_mps, let_go_mps, now_ns)
         target_mps = self._held_mps
-        hardly = not self._increasing and min(target_mps, max_mps) < v_mps + self._config.worth_mps
+        hardly = self._wants_gain(v_mps, now_ns) and min(target_mps, max_mps) < v_mps + self._config.worth_mps
         if hardly or not self._may_turn(now_ns):
             target_mps = min(target_mps, v_mps)
         self._note_turn(target_mps, v_mps, now_ns)
@@ -123,12 +128,19 @@ class ReleaseGate:
         turned_ns = self._turned_ns
         return turned_ns is None or (now_ns - turned_ns) / NS_PER_S >= self._config.hold_s
 
+    def _wants_gain(self, v_mps: float, now_ns: int) -> bool:
+        """Whether a gain may be too small: the robot rolls on after a decrease that is not long ago."""
+        settled = self._slowed_ns is None or (now_ns - self._slowed_ns) / NS_PER_S >= _SETTLED_S
+        return not (self._increasing or settled or v_mps <= STANDING_MPS)
+
     def _note_turn(self, target_mps: float, v_mps: float, now_ns: int) -> None:
         band = self._config.dead_band_mps
         if target_mps > v_mps + band:
             self._increasing = True
-        elif self._increasing:
-            stops = target_mps <= 0.0 and v_mps > STANDING_MPS
-            if stops or target_mps < v_mps - band:
+            return
+        stops = target_mps <= 0.0 and v_mps > STANDING_MPS
+        if stops or target_mps < v_mps - band:
+            self._slowed_ns = now_ns
+            if self._increasing:
                 self._increasing = False
                 self._turned_ns = now_ns

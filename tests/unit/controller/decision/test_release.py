@@ -173,6 +173,21 @@ def test_nor_where_the_path_hardly_allows_more() -> None:
     assert target == 0.5
 
 
+def test_what_is_no_reason_at_first_is_one_after_a_while() -> None:
+    gate = Gate(1.0)
+    gate.hold(0.5, 4.0)
+    assert gate.hold(0.58, 1.0) <= 0.5 + 1e-9
+    assert gate.hold(0.58, 2.0) == 0.58
+
+
+def test_a_standing_robot_starts_for_the_little_that_a_slow_section_allows() -> None:
+    gate = standing()
+    for _ in range(60):
+        target = gate.gate.step(1.5, 0.0, 0.0, gate.now_ns, max_mps=0.05)
+        gate.now_ns += STEP_NS
+    assert target == 1.5
+
+
 def test_a_stop_from_a_crawl_is_a_turn_too() -> None:
     gate = Gate(1.0)
     gate.hold(0.0, 4.0)
