@@ -20,6 +20,7 @@ from controller.decision.decision import Action, Decision, Reason
 from controller.decision.limits import (
     BACKWARDS_MPS,
     BLOCKING_RULES,
+    LEAST_TOLD_MPS,
     STANDING_MPS,
     STANDING_RULES,
     Limit,
@@ -133,7 +134,7 @@ class DecisionMaker:
         raw_mps = self._start_or_creep(least, motion)
         gated_mps = self._gated_mps(raw_mps, least, on_way, motion, now_ns)
         target_mps = min(gated_mps, on_way.speed_mps)
-        reason = self._reason(raw_mps, gated_mps, least, on_way)
+        reason = self._reason(raw_mps, gated_mps, least, on_way, motion)
         self._emergency = self._brakes_hard(limits, min(raw_mps, on_way.speed_mps), motion)
         self._note_stuck(target_mps, motion, reason, now_ns)
         action = self._action(target_mps, motion.v_mps)
@@ -171,7 +172,9 @@ class DecisionMaker:
             least = min(least, max(release.creep_mps, self._config.prediction.beside_mps))
         return limit.speed_mps if limit.speed_mps >= least else 0.0
 
-    def _reason(self, raw_mps: float, gated_mps: float, least: Limit, on_way: Limit) -> Reason:
+    def _reason(
+        self, raw_mps: float, gated_mps: float, least: Limit, on_way: Limit, motion: Motion
+    ) -> Reason:
         """The reason for the target, which is gated_mps or what the path allows.
 
         While the release gate holds the target back, the reason is the last thing that limited it. That is
@@ -186,7 +189,10 @@ class DecisionMaker:
         if gated_mps >= raw_mps or self._last is None:
             return limiting
         held = self._last
-        waits = f"not faster than {gated_mps:.2f} m/s yet" if gated_mps > 0.0 else "not starting yet"
+        if gated_mps > 0.0:
+            waits = f"not faster than {gated_mps:.2f} m/s yet"
+        else:
+            waits = "not starting yet" if motion.v_mps <= STANDING_MPS else "still stopping"
         return Reason(
             "release",
             f"{waits}; last limit: {held.sentence}",
@@ -237,7 +243,7 @@ def _unknown(on_floor: float, along: float) -> str:
 def _reason_for(limit: Limit, speed_mps: float) -> Reason:
     """The limit's reason, if speed_mps is what remains of the limit."""
     reason = limit.reason
-    if speed_mps < limit.speed_mps:
+    if speed_mps < limit.speed_mps and limit.speed_mps >= LEAST_TOLD_MPS:
         return replace(reason, sentence=f"{reason.sentence}, too slow to drive")
     return reason
 

@@ -22,6 +22,7 @@ BACKWARDS_MPS = -0.05  # a smaller backward speed is noise of the odometry
 # Nothing corrects the expected place of a body out of view: while it is not seen, an error of this many
 # standard deviations of its velocity may add up.
 UNSEEN_ERROR_SIGMAS = 2.0
+LEAST_TOLD_MPS = 0.005  # a lower speed would read as 0.00 m/s; a reason says "stop" instead
 # From this time on, that a body is out of view is told in a reason.
 _WORTH_TELLING_S = 1.0
 
@@ -183,4 +184,4 @@ def min_start_mps(release: Release, comfort: BrakeLimits) -> float:
 
 def allowed_text(speed_mps: float) -> str:
     """The end of a reason's sentence: what speed is allowed."""
-    return "stop" if speed_mps <= 0.0 else f"at most {speed_mps:.2f} m/s"
+    return "stop" if speed_mps < LEAST_TOLD_MPS else f"at most {speed_mps:.2f} m/s"

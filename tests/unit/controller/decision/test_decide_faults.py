@@ -185,7 +185,7 @@ def test_after_a_fault_the_speed_comes_back_as_after_an_obstacle(v_mps: float, d
     decision = bench.step(bench.scene(), 1.0)
     assert decision.target_speed_mps == 0.0
     assert decision.reason.rule == "release"
-    assert decision.reason.sentence == f"not starting yet; last limit: {fault.sentence}"
+    assert decision.reason.sentence == f"still stopping; last limit: {fault.sentence}"
 
 
 def test_fault_at_rest_does_not_count_as_a_decrease() -> None:
