@@ -164,7 +164,7 @@ class Release(Section):
         default=0.1,
         ge=0,
         le=1,
-        description="minimum gain for which the robot goes faster again after a decrease",
+        description="minimum gain for which the robot goes faster again soon after a decrease",
     )
     dead_band_mps: float = Field(
         default=0.03, gt=0, le=0.5, description="a target within this of the present speed means keep"
