@@ -28,9 +28,9 @@ def at_fault(
     """Whether the robot moved at the contact, and a reference driver avoids the contact.
 
     The reference driver has the same field of view, reaction_s and limits. It knows the whole motion of a
-    body as soon as it has seen the body moving (or standing, if the body never moves). It brakes hard, brakes
-    comfortably, goes on, or speeds up. Faults of the mission that blind the robot or delay its scenes affect
-    the reference driver in the same way; it brakes hard once it has been blind for some time.
+    body as soon as it has seen the body moving (or standing, if it stands until the contact). It brakes hard,
+    brakes comfortably, goes on, or speeds up. Faults of the mission that blind the robot or delay its scenes
+    affect the reference driver in the same way; it brakes hard once it has been blind for some time.
     """
     if contact.v_mps <= AT_FAULT_MPS:
         return False
@@ -57,16 +57,17 @@ def _first_seen(contact: Contact, stage: Stage, log: DriveLog, planar_camera: Pl
     """The step at which the motion of the touched body could first be seen; None: not before the contact.
 
     Two looks are needed, 0.1 s apart. If a mover stands still in between, this starts anew once it moves
-    again, because its next motion cannot be seen while it stands.
+    again, because its next motion cannot be seen while it stands. If it stands until the contact, there is no
+    next motion.
     """
     body, first, previous = contact.body, None, None
-    moves = bool(stage.world.moves[body])
+    looks = [k for k in range(0, len(log.times_s), _STEPS_PER_LOOK) if log.times_s[k] < contact.t_s]
     stage.world.precompute(np.array(log.times_s[::_STEPS_PER_LOOK]))
-    for k in range(0, len(log.times_s), _STEPS_PER_LOOK):
-        if log.times_s[k] >= contact.t_s:
-            break
-        polygons, velocity = stage.world.snapshot(log.times_s[k])
-        if moves and math.hypot(*velocity[body]) < _SEEN_MOVING_MPS:
+    moved = [_moves(stage, body, log.times_s[k]) for k in looks]
+    last_moved = max((k for k, moves in zip(looks, moved, strict=True) if moves), default=-1)
+    for k, moves in zip(looks, moved, strict=True):
+        polygons, _ = stage.world.snapshot(log.times_s[k])
+        if not moves and k < last_moved:
             first = previous = None
             continue
         if stage.case.faults.blind_since(log.times_s[k]) is not None:
@@ -76,6 +77,11 @@ def _first_seen(contact: Contact, stage: Stage, log: DriveLog, planar_camera: Pl
             seen = _in_view(body, polygons, PlanarPose(*log.poses[k]), planar_camera)
             first, previous = (previous if seen else None), (k if seen else None)
     return first
+
+
+def _moves(stage: Stage, body: int, t_s: float) -> bool:
+    _, velocity = stage.world.snapshot(t_s)
+    return math.hypot(*velocity[body]) >= _SEEN_MOVING_MPS
 
 
 def _in_view(body: int, polygons: FloatArray, pose: PlanarPose, planar_camera: PlanarCamera) -> bool:

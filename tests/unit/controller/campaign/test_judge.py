@@ -147,6 +147,16 @@ def test_body_that_stands_shows_no_sign_of_moving_on() -> None:
     assert (row.contacts, row.contacts_at_fault) == (1, 0)
 
 
+@pytest.mark.parametrize("start_s", [0.0, 30.0])
+def test_driving_into_what_stands_is_at_fault_even_if_it_moves_at_another_time(start_s: float) -> None:
+    """It walks into the way and stands there, or stands there and walks on long after the contact."""
+    who = (
+        mover(5.5, 3.0, 5.5, 0.0, 1.5) if start_s == 0.0 else mover(5.5, 0.0, 5.5, 3.0, 1.5, start_s=start_s)
+    )
+    row = judged(stage(who, length_m=9.0), cruise(0.6, 12.0))
+    assert (row.contacts, row.contacts_at_fault) == (1, 1)
+
+
 def test_a_touch_between_two_control_steps_is_found() -> None:
     """Something flies past the robot's nose at 10 m/s: within one step of 20 ms it has come and gone."""
     graze = mover(1.05, 8.0, 1.05, -8.0, 10.0, start_s=0.0)
