@@ -212,13 +212,6 @@ def build_world(config: AppConfig) -> World:
     return World(scenario_of(config), config.simulation.seed)
 
 
-def build_still_world(config: AppConfig) -> World:
-    """The scenario that is simulated without its movers. Raises ConfigError."""
-    scenario = scenario_of(config)
-    still = tuple(body for body in scenario.bodies if body.motion is None)
-    return World(scenario.model_copy(update={"bodies": still}))
-
-
 def surroundings(config: AppConfig) -> Surroundings:
     """What a video shows around the observations."""
     return Surroundings(

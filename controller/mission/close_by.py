@@ -1,11 +1,11 @@
-"""Bodies that stand nearer to the path than the robot passes: a warning before a simulated drive."""
+"""Bodies that stand, or end, nearer to the path than the robot passes: a warning before a simulated drive."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from config.app import AppConfig
-from controller.build import build_path, build_still_world, path_spec, scenario_of
+from controller.build import build_path, build_world, path_spec, scenario_of
 from controller.path.path import Path
 from hal.types import PlanarPose
 from sim.contact import BUILDING, nearest_body
@@ -21,8 +21,8 @@ _MOST_TOLD = 3
 def close_by_warning(config: AppConfig) -> str | None:
     """One line about what stands on the path, beside it or behind its target; None if there is room.
 
-    Movers are left out: where they will be depends on the time. So are scenarios whose outcome is "blocked".
-    Raises ConfigError, PathError.
+    Movers count where they are at the end of the scenario: before, where they are depends on the time.
+    Scenarios whose outcome is "blocked" are left out. Raises ConfigError, PathError.
     """
     if config.simulation is None or config.governor is not None:
         return None
@@ -31,7 +31,7 @@ def close_by_warning(config: AppConfig) -> str | None:
         return None
     where, _ = path_spec(config)
     path = build_path(config)
-    world = build_still_world(config)
+    world = build_world(config)
     warnings = _beside(config, path, world) | _behind_target(config, path, world)
     if not warnings:
         return None
@@ -48,22 +48,22 @@ def _beside(config: AppConfig, path: Path, world: World) -> dict[str, str]:
     count = min(round(path.length_m / _EVERY_M), _MOST_POSES) + 2
     along_m = np.linspace(0.0, path.length_m, count)
     for s_m, pose in zip(along_m.tolist(), np.stack(path.poses(along_m), axis=1).tolist(), strict=True):
-        found = nearest_body(world, config.robot.body, PlanarPose(*pose), 0.0)
+        found = nearest_body(world, config.robot.body, PlanarPose(*pose), world.scenario.duration_s)
         distance_m = 0.0 if found.touches else found.distance_m
         if distance_m < need_m - 5e-3 and distance_m < nearest.get(found.name, (need_m, 0.0))[0]:
             nearest[found.name] = (distance_m, s_m)
     return {
-        name: _passing(name, distance_m, s_m, lateral_m, need_m)
+        name: _passing(_called(name, world), distance_m, s_m, lateral_m, need_m)
         for name, (distance_m, s_m) in nearest.items()
     }
 
 
-def _passing(name: str, distance_m: float, s_m: float, lateral_m: float, need_m: float) -> str:
+def _passing(what: str, distance_m: float, s_m: float, lateral_m: float, need_m: float) -> str:
     if distance_m <= 0.0:
-        return f"the robot would touch {_called(name)} {s_m:.1f} m along the path, and will wait before it"
+        return f"the robot would touch {what} {s_m:.1f} m along the path, and will wait before it"
     waits = "will" if distance_m < lateral_m else "may"
     return (
-        f"passes {distance_m:.2f} m from {_called(name)}, {s_m:.1f} m along the path; "
+        f"passes {distance_m:.2f} m from {what}, {s_m:.1f} m along the path; "
         f"it needs {need_m:.2f} m, the robot {waits} wait there"
     )
 
@@ -71,16 +71,19 @@ def _passing(name: str, distance_m: float, s_m: float, lateral_m: float, need_m:
 def _behind_target(config: AppConfig, path: Path, world: World) -> dict[str, str]:
     """What stands within margins.stop_m before the robot at its target."""
     stop_m, body = config.decision.margins.stop_m, config.robot.body
-    target = path.pose(path.length_m)
+    target, end_s = path.pose(path.length_m), world.scenario.duration_s
     stretched = body.model_copy(update={"length_m": body.length_m + stop_m})
-    found = nearest_body(world, stretched, target, 0.0)
-    if not found.touches or nearest_body(world, body, target, 0.0).touches:
+    found = nearest_body(world, stretched, target, end_s)
+    if not found.touches or nearest_body(world, body, target, end_s).touches:
         return {}
     return {
-        found.name: f"{_called(found.name)} stands less than margins.stop_m ({stop_m:g} m) behind the "
+        found.name: f"{_called(found.name, world)} stands less than margins.stop_m ({stop_m:g} m) behind the "
         "target, where the robot never arrives"
     }
 
 
-def _called(name: str) -> str:
-    return "a wall of the room" if name == BUILDING else repr(name)
+def _called(name: str, world: World) -> str:
+    if name == BUILDING:
+        return "a wall of the room"
+    moves = any(body.name == name and body.motion is not None for body in world.scenario.bodies)
+    return f"{name!r} where it ends" if moves else repr(name)

@@ -55,7 +55,23 @@ def test_a_crate_too_near_is_told_with_place_and_need(gap_m: float, told: str, t
     assert f"close.yaml: path: {told}" in said
 
 
-def test_no_warning_for_enough_room_for_movers_or_for_intended_blocks(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("x_m", "told"),
+    [
+        (4.0, "the robot would touch 'crate X' where it ends 3.2 m along the path, and will wait before it"),
+        (9.0, "'crate X' where it ends stands less than margins.stop_m (0.45 m) behind the target"),
+    ],
+)
+def test_a_mover_that_ends_on_the_path_or_behind_the_target_is_told(
+    x_m: float, told: str, tmp_path: Path
+) -> None:
+    ends = f", motion: {{steps: [{{kind: go, x_m: {x_m}, y_m: 0.0, speed_mps: 1.0}}]}}"
+    said = warning(scenario(tmp_path, crate(2.0, ends)))
+    assert said is not None
+    assert told in said
+
+
+def test_no_warning_for_enough_room_for_who_moves_on_or_for_intended_blocks(tmp_path: Path) -> None:
     assert warning(scenario(tmp_path, crate(0.25))) is None
     moving = ", motion: {steps: [{kind: go, x_m: 5.0, y_m: 4.0, speed_mps: 1.0}]}"
     assert warning(scenario(tmp_path, crate(0.1, moving))) is None
