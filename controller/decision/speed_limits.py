@@ -80,7 +80,7 @@ class SpeedLimits:
         if known.bodies is not self._taken_from:
             self._take_in(known)
         found = self._depth(known, s_m, motion)
-        found += self._standing.limits(known, s_m, motion)
+        found += self._standing.limits(known, s_m, motion, now_s)
         watched = self._watch.step(known, s_m, now_s)
         if watched is None:
             self._moving.forget()

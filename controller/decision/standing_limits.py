@@ -16,7 +16,15 @@ from config.robot import Limits
 from controller import braking
 from controller.decision.bodies import Bodies
 from controller.decision.corridor import Corridor, Placed, place
-from controller.decision.limits import ALONGSIDE_M, Gap, Limit, Motion, standing_text, stop_before
+from controller.decision.limits import (
+    ALONGSIDE_M,
+    STANDING_MPS,
+    Gap,
+    Limit,
+    Motion,
+    standing_text,
+    stop_before,
+)
 from controller.decision.outline import outline_of
 from controller.decision.view_edges import visible_from_m
 from controller.decision.world_model import WorldModel
@@ -26,6 +34,9 @@ from hal.types import CameraMount, FloatArray
 
 # Beside the robot (its front is past the near side) only a body this far inside the corridor counts.
 _INSIDE_BODY_M = 0.05
+# Hysteresis is against measurements that change, so it ends for a standing robot: what has been clear of the
+# lateral margin for so long stays clear.
+_CLEAR_FOR_S = 2.0
 # Outlines are kept of bodies this far beside the lateral margin: later, when only a part is in view, the box
 # of such a body may reach into the corridor.
 _BESIDE_M = 0.5
@@ -68,8 +79,9 @@ class StandingLimits:
         self._near: list[_Near] = []
         self._corridor: Corridor | None = None
         self._outlines_m: dict[int, float] = {}
+        self._clear_since_s: dict[int, float] = {}
 
-    def limits(self, known: WorldModel, s_m: float, motion: Motion) -> list[Limit]:
+    def limits(self, known: WorldModel, s_m: float, motion: Motion, now_s: float) -> list[Limit]:
         """The limits for a robot at s_m."""
         if known.bodies is not self._taken_from or known.corridor is not self._corridor:
             self._take_in(known, s_m)
@@ -79,6 +91,8 @@ class StandingLimits:
             if near.block_to_s_m <= s_m:
                 continue
             track_id, gap_m = near.track_id, near.block_from_s_m - s_m
+            if self._stays_clear(near, motion.v_mps, now_s):
+                self._inside.discard(track_id)
             beside_m = margins.lateral_m + (margins.graze_m if track_id in self._inside else 0.0)
             if gap_m < -ALONGSIDE_M:
                 # The front has passed its near side: only a body that the robot would really touch counts.
@@ -95,6 +109,13 @@ class StandingLimits:
                 stop_before(gap, motion, self._comfort, near.stop_m, margins.least_m, "static", what)
             )
         return found
+
+    def _stays_clear(self, near: _Near, v_mps: float, now_s: float) -> bool:
+        """Whether a body has been clear of the lateral margin for long, while the robot stands."""
+        if v_mps > STANDING_MPS or near.clearance_m <= self._config.margins.lateral_m:
+            self._clear_since_s.pop(near.track_id, None)
+            return False
+        return now_s - self._clear_since_s.setdefault(near.track_id, now_s) >= _CLEAR_FOR_S
 
     def _take_in(self, known: WorldModel, s_m: float) -> None:
         """Place the standing bodies of a new scene, or along a new path, and drop those too far aside.
@@ -127,6 +148,8 @@ class StandingLimits:
             ).tolist()
             track_ids = bodies.ids[rows].tolist()
             self._near = [_Near(one, *others) for one, others in zip(track_ids, fields, strict=True)]
+        for gone in self._clear_since_s.keys() - {near.track_id for near in self._near}:
+            del self._clear_since_s[gone]
 
     def _clear(self, known: WorldModel, placed: Placed, s_m: float, before: dict[int, float]) -> FloatArray:
         """(N,) free floor between the bodies and the corridor.

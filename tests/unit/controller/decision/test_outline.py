@@ -224,8 +224,8 @@ def test_on_another_path_what_stands_is_placed_anew_without_a_new_scene() -> Non
     assert known.edges == before.edges
     standing = StandingLimits(DecisionConfig(), Robot().limits, MOUNT, set())
     motion = Motion(0.4, 0.0, 0.2)
-    assert standing.limits(before, 0.0, motion) == []
-    (limit,) = standing.limits(known, 0.0, motion)
+    assert standing.limits(before, 0.0, motion, 0.0) == []
+    (limit,) = standing.limits(known, 0.0, motion, 0.0)
     assert limit.reason.rule == "static"
 
 

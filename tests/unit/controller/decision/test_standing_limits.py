@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from config.decision import DecisionConfig, SightConfig
+from controller.decision.decision import Decision
 from controller.decision.standing_limits import _stands_within, _stop_distances
 from tests.support.closed_loop import Box, Mission, standing_at, straight
+from tests.support.decision_bench import Bench, obstacle
 
 
 @pytest.mark.parametrize("near_m", [1.3, 0.4, 0.18])
@@ -33,3 +35,30 @@ def test_bodies_count_from_a_clearance_up_to_another_and_only_if_they_stand() ->
     moving = np.array([False, False, False, False, False, True])
     assert _stands_within(moving, clearance_m, 0.0, 0.3).nonzero()[0].tolist() == [2, 3]
     assert _stands_within(moving, clearance_m, -math.inf, 0.3).nonzero()[0].tolist() == [0, 1, 2, 3]
+
+
+def decided_after(seconds: float, v_mps: float, then_clear_m: float) -> Decision:
+    """Something beside the way is measured inside the lateral margin, then at another clearance."""
+    bench = Bench()
+    for clear_m, time_s in ((0.12, 0.5), (then_clear_m, seconds)):
+        beside = obstacle(1.6, 0.39 + clear_m + 0.25)
+        for _ in range(round(time_s / 0.02)):
+            decision = bench.step(bench.scene(beside), v_mps)
+    return decision
+
+
+@pytest.mark.parametrize(
+    ("seconds", "v_mps", "then_clear_m", "waits"),
+    [
+        pytest.param(1.8, 0.0, 0.17, True, id="not for long"),
+        pytest.param(2.8, 0.0, 0.17, False, id="for long"),
+        pytest.param(2.8, 0.3, 0.17, True, id="the robot drives"),
+        pytest.param(2.8, 0.0, 0.14, True, id="not clear of the margin"),
+        pytest.param(0.8, 0.0, 0.22, False, id="clear of the wider margin"),
+    ],
+)
+def test_a_standing_robot_does_not_wait_forever_for_what_stays_clear_of_the_margin(
+    seconds: float, v_mps: float, then_clear_m: float, waits: bool
+) -> None:
+    decision = decided_after(seconds, v_mps, then_clear_m)
+    assert (decision.reason.rule == "static") == waits
