@@ -12,6 +12,7 @@ Made of known numbers, without images or devices:
 * judging.py - evidence of motion, and the verdict on it
 * parts.py - parts and surfaces as vision/depth/regions.py measures them
 * point_motion.py - points that move before a camera
+* anchored_points.py - points anchored all over the view, and where they are seen after a motion
 
 Depth and images:
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hal.types import FloatArray, Pose
-from tests.unit.vision.ego_motion.test_camera_motion import (
+from tests.support.anchored_points import (
     CAMERA,
     DT_S,
     GLOBAL_SHUTTER,
