@@ -24,6 +24,7 @@ _LARGEST_M = 3.0  # larger ones are walls and racks, which are static
 _ALONE_SHARE = 0.85
 # Margin around a body: the lines behind it end at its outline, and it may have moved since it was reported.
 _MARGIN_PX = 8.0
+_MIN_AHEAD_M = 0.1  # nearer points do not count as in front of the camera (robust_fit.py)
 
 
 def bodies_px(obstacles: tuple[Obstacle, ...]) -> FloatArray:
@@ -52,7 +53,7 @@ def without_lone_body(view: View, start: Pose, boxes_px: FloatArray, camera: Int
 @inlined
 def _told(line: FloatArray, seen: FloatArray, whitening: FloatArray, pose: FloatArray) -> float:
     """What a point tells of a turn about the camera's y axis: the inverse of its variance, 1/rad^2."""
-    z = in_camera(pose, line[0])[2]
+    z = max(in_camera(pose, line[0])[2], _MIN_AHEAD_M)
     dx, dy, dz = turned_back(pose, line[1, 0], line[1, 1], line[1, 2])
     x, y, own, mixed, other = seen[0], seen[1], whitening[0], whitening[1], whitening[2]
     across, down = own * (1.0 + x * x), mixed * (1.0 + x * x) + other * x * y

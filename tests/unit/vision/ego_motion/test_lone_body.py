@@ -118,6 +118,15 @@ def test_a_point_of_unknown_depth_tells_no_turn_along_its_epipolar_line() -> Non
     assert len(without_lone_body(view(unknown), forward, CRATE_PX, CAMERA).seen) < 400
 
 
+def test_a_point_in_the_plane_of_the_lens_does_not_hide_a_lone_body() -> None:
+    points, crate = plain_room()
+    odd = points.points_m.copy()
+    odd[(~crate).nonzero()[0][0]] = [1.0, 0.0, 0.0]
+    seen_before, whole = view(points).seen, view(replace(points, points_m=odd))
+    kept = without_lone_body(View(whole.lines, seen_before, whole.whitening), IDENTITY, CRATE_PX, CAMERA)
+    assert len(kept.seen) < 400
+
+
 def obstacle(box_px: tuple[float, float, float, float], extent_m: FloatArray) -> Obstacle:
     return Obstacle(1, box_px, np.ones(3), extent_m, np.zeros(3), np.eye(3), False, 0.5, 0, 1.0, 0.0)
 
