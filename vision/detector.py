@@ -24,7 +24,6 @@ from vision.depth.depth_grid import DepthGrid, make_grid
 from vision.depth.depth_mask import surface_depth
 from vision.detection import MOTION_NOT_KNOWN, Detection, ego_motion_of, no_motion
 from vision.ego_motion.camera_motion import MIN_AGREEMENT, CameraEstimate, estimate
-from vision.ego_motion.lone_body import bodies_px
 from vision.ego_motion.motion_memory import MotionMemory
 from vision.ego_motion.motion_prior import MotionPrior
 from vision.ego_motion.rolling_shutter import ReadOut
@@ -117,9 +116,8 @@ class Detector:
         depths = depths_with_sigma(anchor, config.depth_noise)
         static = static_points(anchor, depths, store.pixel_cov, excluded, config.max_depth_m)
         pixels = store.ends_px.reshape(-1, 2).astype(float)
-        boxes_px = bodies_px(previous.scene.obstacles if previous else ())
-        sweep = self._read_out.sweep()
-        found = estimate(static, pixels, self._pose, prior, sweep, frame.intrinsics, boxes_px)
+        sweep, obstacles = self._read_out.sweep(), previous.scene.obstacles if previous else ()
+        found = estimate(static, pixels, self._pose, prior, sweep, frame.intrinsics, obstacles)
         motion = self._measure_residuals(frame, anchor, depths, found, excluded)
         step = self._pose.inverse() @ found.pose
         self._read_out.learn(found, vector_from_rotation(step.rotation), dt_s)

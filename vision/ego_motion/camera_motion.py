@@ -43,6 +43,7 @@ from vision.ego_motion.motion_prior import MotionPrior, SweepPrior
 from vision.ego_motion.reprojection import Anchors, View, view_of
 from vision.ego_motion.robust_fit import Fit, fit, misfits
 from vision.numerics.order import variance_ratio
+from vision.scene import Obstacle
 
 # Without odometry, at least this share of the fragments must fit one motion of the camera.
 MIN_AGREEMENT = 0.45
@@ -59,7 +60,6 @@ _BENT_CHI2 = 16.0  # four sigmas: the image alone shows another sweep than the f
 # lie where the colour is.
 _MAX_NOISE_SCALE = 4.0
 _CERTAIN_CHI2 = 9.0  # three sigmas
-_NO_BODIES = np.empty((0, 4))
 _STRAIGHTENED_SHARE = 0.05  # of the points: minimum of additional inliers to accept the larger sweep
 
 
@@ -131,17 +131,17 @@ def estimate(
     prior: MotionPrior,
     sweep: SweepPrior,
     camera: Intrinsics,
-    boxes_px: FloatArray = _NO_BODIES,
+    obstacles: tuple[Obstacle, ...] = (),
 ) -> CameraEstimate:
     """The camera now, from where anchored points are seen now, pixels (N, 2).
 
-    before: pose of the camera in the frame before, in the fixed frame. sweep: prior of the sweep. boxes_px
-    (B, 4): bounding boxes (u0, v0, u1, v1) of what may move as a whole.
+    before: pose of the camera in the frame before, in the fixed frame. sweep: prior of the sweep.
+    obstacles: of the frame before.
     """
     start, points = before @ prior.motion, _Points(anchors, pixels, camera)
     first = _fit_with_sweep(points.usable(), start, prior, sweep)
     if first is not None and prior.source == "odometry" and _implausible(first.fit, prior):
-        others = without_lone_body(first.view, start, boxes_px, camera)
+        others = without_lone_body(first.view, start, obstacles, camera)
         if len(others.seen) < len(first.view.seen):
             first = _fit_with_sweep(others, start, prior, sweep)
     if first is None:

@@ -27,17 +27,12 @@ _MARGIN_PX = 8.0
 _MIN_AHEAD_M = 0.1  # nearer points do not count as in front of the camera (robust_fit.py)
 
 
-def bodies_px(obstacles: tuple[Obstacle, ...]) -> FloatArray:
-    """(B, 4) bounding boxes (u0, v0, u1, v1) of the obstacles that may move as a whole."""
-    boxes = [one.bbox_px for one in obstacles if one.extent_m.max() <= _LARGEST_M]
-    return np.array(boxes, float).reshape(-1, 4)
-
-
-def without_lone_body(view: View, start: Pose, boxes_px: FloatArray, camera: Intrinsics) -> View:
+def without_lone_body(view: View, start: Pose, obstacles: tuple[Obstacle, ...], camera: Intrinsics) -> View:
     """The view without the points of a body that alone tells the camera's turn about its y axis, if any.
 
-    start: about where the camera is now. boxes_px: of bodies_px.
+    start: about where the camera is now. obstacles: of the frame before.
     """
+    boxes_px = _may_move_px(obstacles)
     if not len(boxes_px):
         return view
     focal, centre = np.array([camera.fx, camera.fy] * 2), np.array([camera.cx, camera.cy] * 2)
@@ -48,6 +43,12 @@ def without_lone_body(view: View, start: Pose, boxes_px: FloatArray, camera: Int
     if len(others) == len(view.seen):
         return view
     return View(view.lines[others], view.seen[others], view.whitening[others])
+
+
+def _may_move_px(obstacles: tuple[Obstacle, ...]) -> FloatArray:
+    """(B, 4) bounding boxes (u0, v0, u1, v1) of the obstacles that may move as a whole."""
+    boxes = [one.bbox_px for one in obstacles if one.extent_m.max() <= _LARGEST_M]
+    return np.array(boxes, float).reshape(-1, 4)
 
 
 @inlined

@@ -130,3 +130,9 @@ def test_reason_says_that_the_awaited_body_is_not_seen(forward_mps: float, rule:
     assert decision.reason.rule == rule
     assert decision.reason.sentence.startswith("obstacle 5 (not seen for 2 s)")
     assert what in decision.reason.sentence
+
+
+def test_a_speed_that_would_read_as_zero_is_told_as_a_stop() -> None:
+    decision = Bench().settle(obstacle(0.51 + 0.45 + 0.1 + 0.001, 0.0), v_mps=0.0)
+    assert decision.target_speed_mps == 0.0
+    assert decision.reason.sentence.endswith(" ahead: stop")

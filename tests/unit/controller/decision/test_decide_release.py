@@ -156,12 +156,6 @@ def test_held_at_zero_it_says_whether_it_still_rolls(v_mps: float, told: str) ->
     assert decision.reason.sentence.startswith(told)
 
 
-def test_a_speed_that_would_read_as_zero_is_told_as_a_stop() -> None:
-    decision = Bench().settle(obstacle(0.51 + 0.45 + 0.1 + 0.001, 0.0), v_mps=0.0)
-    assert decision.target_speed_mps == 0.0
-    assert decision.reason.sentence.endswith(" ahead: stop")
-
-
 def test_hold_names_the_obstacle_that_was_there_last() -> None:
     """First obstacle 5, then a nearer 6; a free way in between is no reason."""
     bench = Bench()

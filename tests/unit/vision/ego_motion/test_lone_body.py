@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hal.types import FloatArray, Pose
+from hal.types import Pose
 from tests.support.anchored_points import (
     CAMERA,
     DT_S,
@@ -20,14 +20,23 @@ from tests.support.anchored_points import (
 )
 from vision.camera.lens import rotation_from_vector, vector_from_rotation
 from vision.ego_motion.camera_motion import estimate
-from vision.ego_motion.lone_body import bodies_px, without_lone_body
+from vision.ego_motion.lone_body import without_lone_body
 from vision.ego_motion.motion_prior import MotionPrior, odometry_prior, with_gyro
 from vision.ego_motion.reprojection import Anchors, View, view_of
 from vision.scene import Obstacle
 
 ALONG = np.array([1e5, 0.0, 30.0])  # covariance of a point on a blurred horizontal line, px^2
-CRATE_PX = np.array([[250.0, 120.0, 420.0, 360.0]])
+CRATE_PX = (250.0, 120.0, 420.0, 360.0)
 AHEAD = Pose(np.eye(3), np.array([0.0, 0.0, 0.04]))
+
+
+def obstacle(box_px: tuple[float, float, float, float], width_m: float = 1.0) -> Obstacle:
+    return Obstacle(
+        1, box_px, np.ones(3), np.array([width_m, 1.5, 0.5]), np.zeros(3), np.eye(3), False, 0.5, 0, 1.0, 0.0
+    )
+
+
+CRATE = (obstacle(CRATE_PX),)
 
 
 def plain_room(cornered: float = 0.0) -> tuple[Anchors, np.ndarray]:
@@ -37,7 +46,7 @@ def plain_room(cornered: float = 0.0) -> tuple[Anchors, np.ndarray]:
     """
     points = anchors(400)
     pixels = seen(points.points_m, IDENTITY)
-    u0, v0, u1, v1 = CRATE_PX[0]
+    u0, v0, u1, v1 = CRATE_PX
     crate = (pixels[:, 0] > u0) & (pixels[:, 0] < u1) & (pixels[:, 1] > v0) & (pixels[:, 1] < v1)
     line = ~crate & (np.arange(400) >= cornered * 400)
     covariance = points.pixel_cov.copy()
@@ -49,7 +58,7 @@ def yaw_rad(prior: MotionPrior, true: Pose, aside_m: float = 0.0, cornered: floa
     """Estimated turn about y while the camera moves by true, and the crate by aside_m to the right."""
     points, crate = plain_room(cornered)
     moved = points.points_m + np.where(crate[:, None], [aside_m, 0.0, 0.0], 0.0)
-    found = estimate(points, seen(moved, true), IDENTITY, prior, GLOBAL_SHUTTER, CAMERA, CRATE_PX)
+    found = estimate(points, seen(moved, true), IDENTITY, prior, GLOBAL_SHUTTER, CAMERA, CRATE)
     return float(vector_from_rotation(found.pose.rotation)[1])
 
 
@@ -96,13 +105,13 @@ def view(points: Anchors) -> View:
 
 def test_the_points_in_the_box_of_a_lone_body_and_close_around_it_are_left_out() -> None:
     points, crate = plain_room()
-    kept = without_lone_body(view(points), AHEAD, CRATE_PX, CAMERA)
+    kept = without_lone_body(view(points), AHEAD, CRATE, CAMERA)
     left_out = len(crate) - len(kept.seen)
     assert crate.sum() <= left_out < 1.4 * crate.sum()
     whole = view(points)
-    other = np.array([[0.0, 0.0, 100.0, 100.0]])
-    assert without_lone_body(whole, AHEAD, other, CAMERA) is whole
-    assert without_lone_body(whole, AHEAD, np.empty((0, 4)), CAMERA) is whole
+    other = obstacle((0.0, 0.0, 100.0, 100.0))
+    assert without_lone_body(whole, AHEAD, (other,), CAMERA) is whole
+    assert without_lone_body(whole, AHEAD, (), CAMERA) is whole
 
 
 def test_a_point_of_unknown_depth_tells_no_turn_along_its_epipolar_line() -> None:
@@ -113,9 +122,9 @@ def test_a_point_of_unknown_depth_tells_no_turn_along_its_epipolar_line() -> Non
     covariance[level] = [0.02, 0.0, 0.02]
     beside = replace(points, pixel_cov=covariance)
     forward = Pose(np.eye(3), np.array([0.0, 0.0, 0.5]))
-    assert len(without_lone_body(view(beside), forward, CRATE_PX, CAMERA).seen) == 400
+    assert len(without_lone_body(view(beside), forward, CRATE, CAMERA).seen) == 400
     unknown = replace(beside, depth_sigma_m=np.where(level, 10.0, beside.depth_sigma_m))
-    assert len(without_lone_body(view(unknown), forward, CRATE_PX, CAMERA).seen) < 400
+    assert len(without_lone_body(view(unknown), forward, CRATE, CAMERA).seen) < 400
 
 
 def test_a_point_in_the_plane_of_the_lens_does_not_hide_a_lone_body() -> None:
@@ -123,16 +132,11 @@ def test_a_point_in_the_plane_of_the_lens_does_not_hide_a_lone_body() -> None:
     odd = points.points_m.copy()
     odd[(~crate).nonzero()[0][0]] = [1.0, 0.0, 0.0]
     seen_before, whole = view(points).seen, view(replace(points, points_m=odd))
-    kept = without_lone_body(View(whole.lines, seen_before, whole.whitening), IDENTITY, CRATE_PX, CAMERA)
+    kept = without_lone_body(View(whole.lines, seen_before, whole.whitening), IDENTITY, CRATE, CAMERA)
     assert len(kept.seen) < 400
 
 
-def obstacle(box_px: tuple[float, float, float, float], extent_m: FloatArray) -> Obstacle:
-    return Obstacle(1, box_px, np.ones(3), extent_m, np.zeros(3), np.eye(3), False, 0.5, 0, 1.0, 0.0)
-
-
 def test_walls_and_racks_are_no_bodies() -> None:
-    crate = obstacle((1.0, 2.0, 3.0, 4.0), np.array([1.0, 1.5, 0.5]))
-    rack = obstacle((5.0, 6.0, 7.0, 8.0), np.array([1.0, 2.0, 6.0]))
-    np.testing.assert_array_equal(bodies_px((rack, crate)), [[1.0, 2.0, 3.0, 4.0]])
-    assert bodies_px(()).shape == (0, 4)
+    whole = view(plain_room()[0])
+    assert without_lone_body(whole, AHEAD, (obstacle(CRATE_PX, width_m=3.1),), CAMERA) is whole
+    assert without_lone_body(whole, AHEAD, (obstacle(CRATE_PX, width_m=2.9),), CAMERA) is not whole
