@@ -19,10 +19,11 @@ from tests.support.anchored_points import (
     seen,
 )
 from vision.camera.lens import rotation_from_vector, vector_from_rotation
-from vision.ego_motion.camera_motion import estimate
+from vision.ego_motion.camera_motion import _implausible, estimate
 from vision.ego_motion.lone_body import without_lone_body
 from vision.ego_motion.motion_prior import MotionPrior, odometry_prior, with_gyro
 from vision.ego_motion.reprojection import Anchors, View, view_of
+from vision.ego_motion.robust_fit import Fit
 from vision.scene import Obstacle
 
 ALONG = np.array([1e5, 0.0, 30.0])  # covariance of a point on a blurred horizontal line, px^2
@@ -140,3 +141,15 @@ def test_walls_and_racks_are_no_bodies() -> None:
     whole = view(plain_room()[0])
     assert without_lone_body(whole, AHEAD, (obstacle(CRATE_PX, width_m=3.1),), CAMERA) is whole
     assert without_lone_body(whole, AHEAD, (obstacle(CRATE_PX, width_m=2.9),), CAMERA) is not whole
+
+
+@pytest.mark.parametrize(("sigmas", "implausible"), [(2.9, False), (3.1, True), (-3.1, True)])
+def test_a_turn_is_beyond_slip_only_by_three_sigmas(sigmas: float, implausible: bool) -> None:
+    """What counts is the uncertainty about y; those about x and z are ten times as small and as large."""
+    sigma_rad, prior = 2e-3, odometry(AHEAD)
+    information = np.diag([100.0, 1.0, 0.01, 1.0, 1.0, 1.0, 1.0, 1.0]) / sigma_rad**2
+    turn_rad = np.copysign(prior.slip_rad + abs(sigmas) * sigma_rad, sigmas)
+    back = np.array([0.0, turn_rad, 0.0, 0.0, 0.0, 0.0])
+    found = Fit(AHEAD, np.zeros(2), back, information, 100, information, np.zeros(8), np.zeros(2))
+    loose = replace(prior, sigma=np.full(6, 1.0))
+    assert _implausible(found, loose) == implausible
