@@ -45,6 +45,12 @@ class ReplayCameraConfig(Section):
         min_length=1,
         description="bags: topic of the depth images, if it is not found automatically",
     )
+    gyro: bool = Field(default=True, description="use the gyro of the recording, if it has one")
+    gyro_topic: str | None = Field(
+        default=None,
+        min_length=1,
+        description="bags: topic of the gyro, if it is not found automatically",
+    )
 
     @property
     def edge_tangents(self) -> None:

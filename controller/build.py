@@ -162,11 +162,11 @@ def require_camera(config: AppConfig) -> None:
 
 def _recording(config: AppConfig, camera: ReplayCameraConfig) -> Recording:
     path = config.resolve(camera.folder)
-    wanted = WantedTopics(camera.colour_topic, camera.depth_topic)
+    wanted = WantedTopics(camera.colour_topic, camera.depth_topic, gyro=camera.gyro_topic)
     if is_bag(path):
-        return BagReplay(path, "none", wanted, camera.max_pair_gap_s)
+        return BagReplay(path, "none", wanted, camera.max_pair_gap_s, camera.gyro)
     _refuse_topics(path, wanted)
-    return TumReplay(path, camera.max_pair_gap_s, camera.read_ahead)
+    return TumReplay(path, camera.max_pair_gap_s, camera.read_ahead, camera.gyro)
 
 
 def open_simulated_camera(
@@ -241,23 +241,26 @@ def open_commands(config: AppConfig) -> DatagramLink:
 
 
 def open_replay(
-    path: FilePath, odometry: OdometryChoice, wanted: WantedTopics | None = None
+    path: FilePath, odometry: OdometryChoice, wanted: WantedTopics | None = None, use_gyro: bool = True
 ) -> tuple[Recording, PoseTrack | None]:
     """A recording (a folder or a ROS bag), not yet entered, and its odometry. wanted: topics of a bag.
 
     Raises BadRecording, and DeviceNotFound for a bag without the package that reads it.
     """
+    wanted = wanted or WantedTopics()
     if is_bag(path):
-        if odometry == "none" and wanted is not None and wanted.odometry is not None:
+        if odometry == "none" and wanted.odometry is not None:
             raise BadRecording(f"{path}: --odometry-topic has no effect with --odometry none; leave one out")
-        bag = BagReplay(path, odometry, wanted or WantedTopics())
+        if not use_gyro and wanted.gyro is not None:
+            raise BadRecording(f"{path}: --gyro-topic has no effect with --no-gyro; leave one out")
+        bag = BagReplay(path, odometry, wanted, use_gyro=use_gyro)
         return bag, bag.odometry
     _refuse_topics(path, wanted)
-    return TumReplay(path), open_odometry(path, odometry)
+    return TumReplay(path, use_gyro=use_gyro), open_odometry(path, odometry)
 
 
-def _refuse_topics(folder: FilePath, wanted: WantedTopics | None) -> None:
-    if wanted is not None and wanted != WantedTopics():
+def _refuse_topics(folder: FilePath, wanted: WantedTopics) -> None:
+    if wanted != WantedTopics():
         raise BadRecording(
             f"{folder}: is no ROS bag, so it has no topics; leave out colour-topic and the like"
         )

@@ -92,15 +92,18 @@ def govern(options: MissionOptions) -> None:
     help="Prior of the camera's motion. file: odometry.txt or a bag's topic; auto: that, if there is one; "
     "none: images and depth alone; groundtruth: the true poses.",
 )  # fmt: skip
+@click.option("--no-gyro", is_flag=True, help="Leave the recorded gyro out.")
 @topic_options
 @config_option("of robot, perception and decision", CONFIG_DIR / "replay.yaml", "the replay.yaml that ships")
 @recording_options
 def replay(
     recording: Path,
     odometry: OdometryChoice,
+    no_gyro: bool,
     colour_topic: str | None,
     depth_topic: str | None,
     odometry_topic: str | None,
+    gyro_topic: str | None,
     config_path: Path,
     observations: Path | None,
     video: Path | None,
@@ -115,8 +118,10 @@ def replay(
     from controller.replay.command import ReplayOptions, run_replay
     from hal.cameras.bag_topics import WantedTopics
 
-    topics = WantedTopics(colour_topic, depth_topic, odometry_topic)
-    run_replay(ReplayOptions(recording, odometry, config_path, observations, video, quiet, topics))
+    topics = WantedTopics(colour_topic, depth_topic, odometry_topic, gyro_topic)
+    run_replay(
+        ReplayOptions(recording, odometry, config_path, observations, video, quiet, topics, not no_gyro)
+    )
 
 
 @cli.command()

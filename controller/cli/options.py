@@ -95,14 +95,14 @@ def recording_options(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def topic_options(command: Callable[..., None]) -> Callable[..., None]:
-    """--colour-topic, --depth-topic and --odometry-topic."""
+    """--colour-topic, --depth-topic, --odometry-topic and --gyro-topic."""
     return _in_this_order(
         command,
         *(
             click.option(
                 f"--{what}-topic", metavar="TOPIC", help=f"Bag: topic of the {what}, if it is not found."
             )
-            for what in ("colour", "depth", "odometry")
+            for what in ("colour", "depth", "odometry", "gyro")
         ),
     )
 

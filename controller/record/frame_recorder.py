@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from types import TracebackType
@@ -11,7 +12,7 @@ from typing import Self
 from controller.terminal.outlet import say
 from hal.cameras.tum_writer import TumWriter
 from hal.errors import DeviceRefused
-from hal.types import Pose, RgbdFrame
+from hal.types import GyroSamples, Pose, RgbdFrame
 
 # Maximum number of frames that wait to be written: two thirds of a second, longer than the occasional pauses
 # of a disk; about 30 MB.
@@ -64,14 +65,23 @@ class FrameRecorder:
         self._collect(len(self._waiting) if self._may_drop else _MAX_WAITING - 1)
         if len(self._waiting) >= _MAX_WAITING:
             self.dropped += 1
+            if frame.gyro is not None:
+                # A few lines, in place of megabytes: without them, the next frames would have no gyro either.
+                self._waiting.append(self._thread.submit(self._write_gyro, frame.gyro))
             return
         self._waiting.append(self._thread.submit(self._write, frame, odometry))
 
+    def _write_gyro(self, samples: GyroSamples) -> None:
+        self._unless_failed(lambda: self._writer.write_gyro(samples))
+
     def _write(self, frame: RgbdFrame, odometry: Pose | None) -> None:
+        self._unless_failed(lambda: self._writer.write(frame, odometry))
+
+    def _unless_failed(self, write: Callable[[], None]) -> None:
         if self._failed:  # a recording ends, rather than have a gap
             return
         try:
-            self._writer.write(frame, odometry)
+            write()
         except ValueError as error:
             self._failed = True
             raise DeviceRefused(f"{self._folder}: the recording ends here: {error}") from error

@@ -29,6 +29,8 @@ from controller.record.tally import ConditionTally, TimingTally
 from controller.replay.build import build_replay_decision, build_replay_perceiver, replay_surroundings
 from controller.terminal.console import Console
 from hal.cameras.bag_topics import WantedTopics
+from hal.cameras.gyro_track import GyroTrack
+from hal.cameras.pose_track import PoseTrack
 from hal.clocks import NS_PER_S
 from hal.errors import EndOfStream
 from hal.geometry import mount_of
@@ -51,6 +53,7 @@ class ReplayOptions:
     video: FilePath | None = None
     quiet: bool = False
     topics: WantedTopics = field(default_factory=WantedTopics)
+    use_gyro: bool = True
 
 
 @dataclass
@@ -88,7 +91,7 @@ def run_replay(options: ReplayOptions) -> None:
     config = load_replay(options.config_path)
     _refuse_overwriting(options)
     console = Console(options.quiet, aside=options.observations == STANDARD_OUTPUT)
-    source, odometry = open_replay(options.recording, options.odometry, options.topics)
+    source, odometry = open_replay(options.recording, options.odometry, options.topics, options.use_gyro)
     mount = recorded_mount(config, source.mount)
     perceiver = build_replay_perceiver(config, mount, odometry, time.perf_counter_ns)
     decide = build_replay_decision(config, mount, source.fps)
@@ -113,14 +116,26 @@ def run_replay(options: ReplayOptions) -> None:
             recorder.record(look, decision, measured_mps=v_mps, path_ahead_m=STRAIGHT_AHEAD_M)
             console.progress(tally.frames / source.frame_count, f"frame {tally.frames}/{source.frame_count}")
             console.decision((tally.last_ns - tally.first_ns) / NS_PER_S, decision, v_mps)
-    prior = "none: the camera's motion is estimated from images and depth alone"
-    if odometry is not None:
-        prior = f"{odometry.name}: {len(odometry)} poses"
-        if tally.without_pose:
-            prior += f"; of the time of {tally.without_pose} of {tally.frames} frames there is none"
+    prior = _prior(odometry, source.gyro, tally)
     skipped = [str(skip) for skip in source.skipped]
     notes = (*source.notes, *_mount_notes(options, config, source.mount))
     console.summary(_summary(options, tally, prior, skipped, notes))
+
+
+def _prior(odometry: PoseTrack | None, gyro: GyroTrack | None, tally: ReplayTally) -> str:
+    """What is known of the camera's motion besides the images, for the summary."""
+    prior = "none: the camera's motion is estimated from images and depth alone"
+    if odometry is not None:
+        prior = f"{odometry.name}: {len(odometry)} poses" + _not_of_all(tally.without_pose, tally.frames)
+    elif gyro is not None:
+        prior = "none"
+    if gyro is not None:
+        prior += f"; {gyro.name}: {len(gyro)} readings of a gyro" + _not_of_all(gyro.missed, tally.frames)
+    return prior
+
+
+def _not_of_all(without: int, frames: int) -> str:
+    return f"; of the time of {without} of {frames} frames there is none" if without else ""
 
 
 def _refuse_overwriting(options: ReplayOptions) -> None:

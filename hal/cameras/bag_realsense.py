@@ -1,16 +1,17 @@
 """The peculiarities of bags that librealsense writes: ROS 1 (.bag, until 2.55) and ROS 2 (.db3, 2.59).
 
-Streams are named like /device_0/sensor_1/Color_0; their images are in the topic /image/data below that. The
-depth unit is an option of the sensor. In a .bag, four more bytes follow each image (its depth unit, a float;
-not in old bags), the calibration is in /info/camera_info of the stream, and /tf/1 of a stream holds the pose
-of the reference stream in it.
+Streams are named like /device_0/sensor_1/Color_0; their images are in the topic /image/data below that, the
+readings of a gyro in /imu/data. The depth unit is an option of the sensor. In a .bag, four more bytes follow
+each image (its depth unit, a float; not in old bags), the calibration is in /info/camera_info of the stream,
+and /tf/1 of a stream holds the pose of the reference stream in it.
 """
 
 from __future__ import annotations
 
 import struct
 
-_DEVICE, _IMAGES = "/device_", "/image/data"
+_DEVICE = "/device_"
+_DATA = ("/image/data", "/imu/data")
 _IMAGE = "sensor_msgs/msg/Image"
 _LENGTH = struct.Struct("<I")
 # Bytes of a serialised Image before the name of the frame, between that and the name of the encoding, and
@@ -20,9 +21,12 @@ TRANSFORM = "geometry_msgs/msg/Transform"
 
 
 def stream_of(topic: str) -> str | None:
-    """The stream that an image topic belongs to; None if librealsense did not write it."""
-    stream, found, _ = topic.partition(_IMAGES)
-    return stream if found and topic.startswith(_DEVICE) else None
+    """The stream that a topic of images or readings belongs to; None if librealsense did not write it."""
+    for data in _DATA:
+        stream, found, _ = topic.partition(data)
+        if found and topic.startswith(_DEVICE):
+            return stream
+    return None
 
 
 def message_of(topic: str, kind: str, data: bytes) -> bytes:

@@ -14,6 +14,7 @@ from typing import Any, Self
 from config.camera import OdometryChoice
 from hal.cameras.bag_calibration import read_calibration, read_transforms
 from hal.cameras.bag_file import BagFile
+from hal.cameras.bag_gyro import read_gyro
 from hal.cameras.bag_images import colour_image, depth_image
 from hal.cameras.bag_odometry import read_odometry, stamp_ns
 from hal.cameras.bag_topics import BagTopics, WantedTopics, choose_topics
@@ -39,7 +40,8 @@ class BagReplay:
     The constructor reads topics, calibration and odometry (raises BadRecording, and DeviceNotFound if rosbags
     is not installed); images are read after entering. captured_ns is the time in the header of the colour
     image.
-    odometry: the chosen poses, None if there are none. Entering again starts from the beginning.
+    odometry: the chosen poses, None if there are none. gyro: its readings, None if there are none or they are
+    not to be used. Entering again starts from the beginning.
     """
 
     def __init__(
@@ -48,6 +50,7 @@ class BagReplay:
         odometry: OdometryChoice = "auto",
         wanted: WantedTopics = _ANY_TOPICS,
         max_pair_gap_s: float = 0.02,
+        use_gyro: bool = True,
     ) -> None:
         self._path, self._max_gap_ns = path, round(max_pair_gap_s * NS_PER_S)
         with BagFile(path) as bag:
@@ -55,9 +58,13 @@ class BagReplay:
             transforms = read_transforms(bag)
             camera, frame, notes = read_calibration(bag, self._topics, transforms)
             self.odometry, odometry_notes = _odometry(bag, self._topics, odometry, frame, transforms)
-            self.fps = _estimate_fps(bag, self._topics.colour.name)
+            colour = self._topics.colour.name
+            self.gyro, gyro_notes = (
+                read_gyro(bag, wanted.gyro, colour, frame, transforms) if use_gyro else (None, ())
+            )
+            self.fps = _estimate_fps(bag, colour)
         self._calibration = RecordingCalibration(camera)
-        self._notes = (*notes, *odometry_notes)
+        self._notes = (*notes, *odometry_notes, *gyro_notes)
         self._messages: Iterator[tuple[str, Any]] | None = None
         self._closing = ExitStack()
         self._rewind()
@@ -123,7 +130,7 @@ class BagReplay:
             outcome = self._load(*self._pairs.popleft())
             if isinstance(outcome, RgbdFrame):
                 self._usable += 1
-                return outcome
+                return outcome if self.gyro is None else self.gyro.attach(outcome)
             self._skipped.append(outcome)
         if self._usable == 0:
             raise BadRecording(f"{self._path}: not one frame is usable; {self._no_frame_reason()}")
@@ -149,6 +156,8 @@ class BagReplay:
         self._pairs: deque[tuple[Stamped[Any], Stamped[Any]]] = deque()
         self._skipped: list[SkippedFrame] = []
         self._usable, self._messages_read, self._ended = 0, 0, False
+        if self.gyro is not None:
+            self.gyro.rewind()
 
     def _read_message(self, messages: Iterator[tuple[str, Any]]) -> None:
         try:

@@ -1,4 +1,4 @@
-"""Chooses the topics of a bag for colour, depth, their calibration and the odometry."""
+"""Chooses the topics of a bag for colour, depth, their calibration and the odometry (gyro: bag_gyro.py)."""
 
 from __future__ import annotations
 
@@ -27,6 +27,7 @@ class WantedTopics:
     colour: str | None = None
     depth: str | None = None
     odometry: str | None = None
+    gyro: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +86,19 @@ def is_registered(topic: str) -> bool:
     return any(word in topic.lower() for word in _REGISTERED_WORDS)
 
 
+def named_topic(path: Path, topics: Sequence[Topic], wanted: str, kind: str) -> Topic:
+    """The topic that the user chose for kind. Raises BadRecording if it is none of the topics."""
+    named = [topic for topic in topics if topic.name == wanted]
+    if named:
+        return named[0]
+    raise BadRecording(f"{path}: {kind} topic {wanted}: there is none; there are {list_names(topics)}")
+
+
+def list_names(topics: Sequence[Topic]) -> str:
+    """Their names, for a sentence."""
+    return ", ".join(topic.name for topic in topics) or "none of that kind"
+
+
 def _is_rectified(topic: str) -> bool:
     return _RECTIFIED in base_name(topic).rsplit("/", 1)[-1]
 
@@ -94,22 +108,18 @@ def _choose(
 ) -> Topic:
     """The wanted topic, or the one with the lowest rank. A rank of None excludes a topic."""
     if wanted is not None:
-        named = [topic for topic in topics if topic.name == wanted]
-        if named:
-            return named[0]
-        raise BadRecording(f"{path}: {kind} topic {wanted}: there is none; there are {_list_names(topics)}")
+        return named_topic(path, topics, wanted, kind)
     ranked = {topic: rank_value for topic in topics if (rank_value := rank(topic)) is not None}
     if not ranked:
         raise BadRecording(
             f"{path}: no topic with {kind} images was found; choose one with {_option(kind)}; "
-            f"there are {_list_names(topics)}"
+            f"there are {list_names(topics)}"
         )
     best = [topic for topic in topics if ranked.get(topic) == min(ranked.values())]
     # The same images in several transports: uncompressed ones sort first, by their shorter name.
     if len({base_name(topic.name) for topic in best}) > 1:
         raise BadRecording(
-            f"{path}: several topics could be the {kind}: {_list_names(best)}; "
-            f"choose one with {_option(kind)}"
+            f"{path}: several topics could be the {kind}: {list_names(best)}; choose one with {_option(kind)}"
         )
     return min(best, key=lambda topic: len(topic.name))
 
@@ -142,7 +152,3 @@ def _option(what: str) -> str:
     """The option with which the user chooses a topic, on the command line or in YAML."""
     in_yaml = "" if what == "odometry" else f" (or camera.{what}_topic)"
     return f"--{what}-topic{in_yaml}"
-
-
-def _list_names(topics: Sequence[Topic]) -> str:
-    return ", ".join(topic.name for topic in topics) or "none of that kind"

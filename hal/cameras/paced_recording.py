@@ -15,7 +15,7 @@ from hal.types import Intrinsics, RgbdFrame
 
 class PacedRecording:
     """FrameSource that gives each frame when it is due, counted from the first read, with that time as
-    captured_ns.
+    captured_ns. The times of its gyro are shifted as much.
 
     For tests of a real base with recorded images: the decision needs fresh frames. A reader that does not
     keep up gets the newest frame that is due, as from a camera; the frames before it are skipped.
@@ -55,7 +55,10 @@ class PacedRecording:
             self._waiting = frame
             raise FrameTimeout(f"the recording has no frame within {timeout_s:g} s")
         self._waiting = None
-        return replace(frame, captured_ns=due_ns)
+        gyro = frame.gyro
+        if gyro is not None:
+            gyro = replace(gyro, stamps_ns=gyro.stamps_ns + self._offset_ns)
+        return replace(frame, captured_ns=due_ns, gyro=gyro)
 
     def _newest_due(self, now_ns: int) -> RgbdFrame:
         """The newest frame that is due, or the next one if none is."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from hal.api import FrameSource
+from hal.cameras.gyro_track import GyroTrack
 from hal.types import CameraMount
 
 
@@ -45,6 +46,11 @@ class Recording(FrameSource, Protocol):
     @property
     def skipped(self) -> tuple[SkippedFrame, ...]:
         """What could not be used so far, and why, in the order of the recording."""
+        ...
+
+    @property
+    def gyro(self) -> GyroTrack | None:
+        """The gyro whose readings come with the frames; None if there is none."""
         ...
 
     @property

@@ -16,6 +16,7 @@ from types import TracebackType
 from typing import Self
 
 from hal.cameras.calibration import RecordingCalibration
+from hal.cameras.gyro_file import read_gyro
 from hal.cameras.image_file import ImageError, read_colour, read_depth
 from hal.cameras.recording import SkippedFrame
 from hal.cameras.tum_index import ImageIndex, IndexEntry, associate, read_index
@@ -40,21 +41,24 @@ class _Pair:
 
 
 class TumReplay:
-    """FrameSource over a folder with rgb.txt, depth.txt and camera.yaml; see config/recording.py.
+    """FrameSource over a folder with rgb.txt, depth.txt, camera.yaml (config/recording.py), maybe gyro.txt.
 
-    The constructor reads index and calibration (raises BadRecording); images are read after entering.
+    The constructor reads index, calibration and gyro (raises BadRecording); images are read after entering.
     captured_ns is the recorded time of the colour image. A frame that cannot be used is left out and listed
     in ``skipped``. Entering again starts from the beginning.
     """
 
-    def __init__(self, folder: Path, max_pair_gap_s: float = 0.02, read_ahead: int = 2) -> None:
+    def __init__(
+        self, folder: Path, max_pair_gap_s: float = 0.02, read_ahead: int = 2, use_gyro: bool = True
+    ) -> None:
         """read_ahead: frames that one background thread decodes in advance; 0: decode in read()."""
         self._folder = folder
         _require_recording(folder)
         self._calibration = RecordingCalibration.from_file(folder / "camera.yaml")
         colour, depth = read_index(folder / "rgb.txt"), read_index(folder / "depth.txt")
         self._pairs = _pairs(folder, colour, depth, max_pair_gap_s)
-        self._bad_lines = colour.bad_lines + depth.bad_lines
+        self.gyro, bad_readings = read_gyro(folder) if use_gyro else (None, ())
+        self._bad_lines = colour.bad_lines + depth.bad_lines + bad_readings
         self.unpaired_colour = len(colour.entries) - len(self._pairs)
         self.unpaired_depth = len(depth.entries) - len(self._pairs)
         self.duplicates = colour.duplicates + depth.duplicates
@@ -127,7 +131,7 @@ class TumReplay:
         while (outcome := self._next_outcome(self._reader)) is not None:
             if isinstance(outcome, RgbdFrame):
                 self._usable += 1
-                return outcome
+                return outcome if self.gyro is None else self.gyro.attach(outcome)
             self._skipped.append(outcome)
         if self._usable == 0:
             raise BadRecording(
@@ -155,6 +159,8 @@ class TumReplay:
         self._usable = 0
         self._skipped: list[SkippedFrame] = []
         self._futures: deque[Future[RgbdFrame | SkippedFrame]] = deque()
+        if self.gyro is not None:
+            self.gyro.rewind()
 
     def _next_outcome(self, reader: ThreadPoolExecutor) -> RgbdFrame | SkippedFrame | None:
         """The next frame, or why it is unusable; None after the last."""

@@ -13,15 +13,16 @@ from typing import Self
 import cv2
 import yaml
 
+from hal.cameras.gyro_file import GYRO_FILE, GYRO_HEADING, gyro_lines
 from hal.cameras.pose_track import quaternion_of
 from hal.cameras.tum_index import format_stamp
 from hal.errors import DeviceRefused
-from hal.types import CameraMount, Pose, RgbdFrame
+from hal.types import CameraMount, GyroSamples, Pose, RgbdFrame
 
 # zlib's fastest level: a third of the time of the default level, for 10 % more bytes.
 _PNG_FAST = (cv2.IMWRITE_PNG_COMPRESSION, 1)
 # Any of them makes a folder a recording. One that is left of another recording would pass for a part of this.
-_OWN_FILES = ("rgb.txt", "depth.txt", "camera.yaml", "odometry.txt", "groundtruth.txt")
+_OWN_FILES = ("rgb.txt", "depth.txt", "camera.yaml", "odometry.txt", "groundtruth.txt", GYRO_FILE)
 
 
 class _AppendFile:
@@ -66,6 +67,7 @@ class TumWriter:
         self._first: RgbdFrame | None = None
         self._last_ns = -1
         self._odometry: _AppendFile | None = None
+        self._gyro: _AppendFile | None = None
 
     def prepare(self) -> None:
         """Make the folders. Raises DeviceRefused if that fails or if there is a recording already."""
@@ -89,13 +91,13 @@ class TumWriter:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._colour_index.close()
-        self._depth_index.close()
-        if self._odometry is not None:
-            self._odometry.close()
+        for file in (self._colour_index, self._depth_index, self._odometry, self._gyro):
+            if file is not None:
+                file.close()
 
     def write(self, frame: RgbdFrame, odometry: Pose | None = None) -> None:
-        """Add one frame. odometry: the camera's pose by dead reckoning at captured_ns, for odometry.txt.
+        """Add one frame, with its gyro. odometry: the camera's pose by dead reckoning at captured_ns, for
+        odometry.txt.
 
         Raises ValueError if the frame does not fit the earlier ones, DeviceRefused if it cannot be written.
         Nothing of it is left then: the indexes name whole files only.
@@ -116,8 +118,15 @@ class TumWriter:
             self._write_image(depth, frame.depth, rollback)
             if odometry is not None:
                 self._add(self._pose_file(), _pose_line(stamp, odometry), rollback)
+            self._add_gyro(frame.gyro, rollback)
             self._add(self._colour_index, f"{stamp} {colour}", rollback)
             self._add(self._depth_index, f"{stamp} {depth}", rollback)
+            rollback.pop_all()
+
+    def write_gyro(self, samples: GyroSamples) -> None:
+        """Add the readings that came with a frame that is not written. Raises DeviceRefused."""
+        with ExitStack() as rollback:
+            self._add_gyro(samples, rollback)
             rollback.pop_all()
 
     def _write_image(self, file: str, image: cv2.typing.MatLike, rollback: ExitStack) -> None:
@@ -131,6 +140,14 @@ class TumWriter:
         rollback.callback(file.truncate_to, file.length)
         with self._refusing(file.name):
             file.add(line)
+
+    def _add_gyro(self, samples: GyroSamples | None, rollback: ExitStack) -> None:
+        lines = "" if samples is None else gyro_lines(samples)
+        if not lines:
+            return
+        if self._gyro is None:
+            self._gyro = self._open_file(GYRO_FILE, GYRO_HEADING)
+        self._add(self._gyro, lines, rollback)
 
     def _pose_file(self) -> _AppendFile:
         if self._odometry is None:

@@ -122,6 +122,20 @@ class Ros:
         )
         return self.make("tf2_msgs/msg/TFMessage", transforms=[stamped])
 
+    def imu(self, stamp_ns: int, frame: str, rates_radps: Sequence[float]) -> Any:
+        x, y, z = rates_radps
+        level = self.make("geometry_msgs/msg/Quaternion", x=0.0, y=0.0, z=0.0, w=1.0)
+        return self.make(
+            "sensor_msgs/msg/Imu",
+            header=self.header(stamp_ns, frame),
+            orientation=level,
+            orientation_covariance=np.zeros(9),
+            angular_velocity=self.make("geometry_msgs/msg/Vector3", x=x, y=y, z=z),
+            angular_velocity_covariance=np.zeros(9),
+            linear_acceleration=self.make("geometry_msgs/msg/Vector3", x=0.0, y=0.0, z=0.0),
+            linear_acceleration_covariance=np.zeros(9),
+        )
+
     def odometry(
         self, stamp_ns: int, position: Sequence[float], quaternion: Sequence[float], child: str = "base_link"
     ) -> Any:

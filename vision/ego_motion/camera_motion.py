@@ -21,7 +21,8 @@ Conflict with a trusted prior (from odometry, or from the kinematics of a tracke
   to move have no vote for that motion, but count against it if they are where the prior expects them. A
   vehicle that filled the view was taken for static in the frames before; then what is static seems to move.
 * If one body alone tells that motion, it has no say: it may move itself (vision/ego_motion/lone_body.py).
-  This holds for odometry, and also for a turn that differs from it by more than slip explains.
+  This holds where odometry or a gyro tells the turn, and also for a turn that differs from it by more than
+  slip explains.
 * Otherwise the fit is repeated with a tighter prior. If the result still contradicts it, or too few points
   agree, the prior alone is the answer.
 
@@ -140,7 +141,7 @@ def estimate(
     """
     start, points = before @ prior.motion, _Points(anchors, pixels, camera)
     first = _fit_with_sweep(points.usable(), start, prior, sweep)
-    if first is not None and prior.source == "odometry" and _implausible(first.fit, prior):
+    if first is not None and prior.knows_turn and _implausible(first.fit, prior):
         others = without_lone_body(first.view, start, obstacles, camera)
         if len(others.seen) < len(first.view.seen):
             first = _fit_with_sweep(others, start, prior, sweep)

@@ -33,10 +33,16 @@ class MotionMemory:
         if odometry is not None and self._odometry is not None:
             prior = odometry_prior(self._odometry.inverse() @ odometry, dt_s, settings)
         elif self._mount is not None:
-            prior = rolling_prior(self._turn_radps(self._mount), self._speed, dt_s, self._mount, settings)
+            prior = self._rolling_prior(self._mount, turn_rad, dt_s)
         else:
             prior = steady_prior(self._last, self._last_dt_s, dt_s, settings)
         return prior if turn_rad is None else with_gyro(prior, turn_rad, dt_s, settings)
+
+    def _rolling_prior(self, mount: CameraMount, turn_rad: FloatArray | None, dt_s: float) -> MotionPrior:
+        if turn_rad is None:
+            return rolling_prior(self._turn_radps(mount), self._speed, dt_s, mount, self._settings)
+        turn_radps = float(turn_rad @ down(mount)) / dt_s
+        return rolling_prior(turn_radps, self._speed, dt_s, mount, self._settings, self._settings.gyro_radps)
 
     def _turn_radps(self, mount: CameraMount) -> float | None:
         if self._last_dt_s == 0.0:

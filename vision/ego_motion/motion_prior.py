@@ -35,7 +35,8 @@ class MotionPrior:
         along x, y, z, (6,).
     source: "odometry" or "none"; see EgoMotion.
     trusted: so reliable that image data which contradict it must have followed something large that moves.
-    slip_rad: how far the turn about y may differ because tracks slip; inf: by as much as the images tell.
+    slip_rad: how far the turn about y may differ because tracks slip, or a gyro drifts; inf: nothing but the
+        images tells the turn.
     """
 
     motion: Pose
@@ -43,6 +44,11 @@ class MotionPrior:
     source: str
     trusted: bool = False
     slip_rad: float = math.inf
+
+    @property
+    def knows_turn(self) -> bool:
+        """Whether odometry or a gyro tells the turn, which one body in view must not overrule."""
+        return math.isfinite(self.slip_rad)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -88,6 +94,7 @@ def rolling_prior(
     dt_s: float,
     mount: CameraMount,
     settings: EgoMotionSettings,
+    turn_sigma_radps: float | None = None,
 ) -> MotionPrior:
     """A prior without odometry: the robot keeps its forward speed and its rate of turn.
 
@@ -95,12 +102,15 @@ def rolling_prior(
     vibration. Therefore something that crosses the view is not taken for the robot's own motion. Nor is
     something that moves ahead of the robot at its own speed, since a tracked robot changes its speed slowly.
     turn_radps: rate of turn in the frame before, None if it is not known. speed: of the robot then.
+    turn_sigma_radps: standard deviation of turn_radps where a gyro measured it now.
     """
     turn_rad = 0.0 if turn_radps is None else turn_radps * dt_s
     swing_m = np.array([mount.forward_m * turn_rad, 0.0, 0.0])
     motion = Pose(rotation_from_vector(turn_rad * down(mount)), speed.mps * dt_s * ahead(mount) + swing_m)
     factor = settings.unknown_factor
     sigma_radps = settings.steady_rotation_radps * (factor if turn_radps is None else 1.0)
+    if turn_sigma_radps is not None:
+        sigma_radps = turn_sigma_radps
     sigma_mps = min(speed.later_sigma_mps(dt_s, settings), settings.steady_speed_mps * factor)
     sigma = np.array(
         [
@@ -118,8 +128,11 @@ def rolling_prior(
 def with_gyro(
     prior: MotionPrior, turn_rad: FloatArray, dt_s: float, settings: EgoMotionSettings
 ) -> MotionPrior:
-    """The prior with its rotation replaced by turn_rad (3,), which a gyro measured over the interval dt_s."""
+    """The prior with its rotation replaced by turn_rad (3,), which a gyro measured over the interval dt_s.
+
+    A gyro does not slip, so a turn of the images that differs from it is an error of one of the two.
+    """
     sigma = prior.sigma.copy()
     sigma[:3] = settings.gyro_radps * dt_s
     motion = Pose(rotation_from_vector(turn_rad), prior.motion.translation_m)
-    return MotionPrior(motion, sigma, prior.source, prior.trusted, prior.slip_rad)
+    return MotionPrior(motion, sigma, prior.source, prior.trusted, slip_rad=settings.gyro_radps * dt_s)

@@ -60,6 +60,11 @@ def test_a_topic_of_odometry_that_is_not_wanted(tmp_path: Path) -> None:
     assert "--odometry-topic has no effect" in refusal("replay", tmp_path / "run.mcap", *wish)
 
 
+def test_a_topic_of_a_gyro_that_is_not_wanted(tmp_path: Path) -> None:
+    wish = ("--no-gyro", "--gyro-topic", "/imu")
+    assert "--gyro-topic has no effect" in refusal("replay", tmp_path / "run.mcap", *wish)
+
+
 @pytest.mark.parametrize(
     ("option", "name", "told"),
     [

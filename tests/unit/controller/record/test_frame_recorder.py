@@ -6,6 +6,7 @@ import errno
 import json
 import os
 import threading
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ from hal.cameras.pose_file import open_odometry
 from hal.cameras.tum_replay import TumReplay
 from hal.cameras.tum_writer import TumWriter
 from hal.errors import DeviceRefused, EndOfStream
-from hal.types import Pose, RgbdFrame
+from hal.types import GyroSamples, Pose, RgbdFrame
 from tests.support.recordings import START_NS, small_frame
 
 SCENARIO = Path(__file__).resolve().parents[3] / "scenarios" / "short_crossing.yaml"
@@ -35,6 +36,10 @@ class StuckWriter(TumWriter):
         super().__init__(folder)
         self.goes_on = threading.Event()
         self.written: list[int] = []
+        self.gyro: list[int] = []
+
+    def write_gyro(self, samples: GyroSamples) -> None:
+        self.gyro += samples.stamps_ns.tolist()
 
     def write(self, frame: RgbdFrame, odometry: Pose | None = None) -> None:
         assert self.goes_on.wait(10.0)
@@ -51,6 +56,17 @@ def test_frames_are_left_out_and_told_where_the_disk_does_not_keep_up(
     assert writer.written == list(range(20))
     assert recorder.dropped == 5
     assert f"{tmp_path}: 5 frames were left out" in capsys.readouterr().err
+
+
+def test_the_gyro_of_frames_that_are_left_out_is_kept(tmp_path: Path) -> None:
+    """Without it, the frames after them would have no gyro."""
+    with StuckWriter(tmp_path) as writer, FrameRecorder(writer, tmp_path, may_drop=True) as recorder:
+        for number in range(23):
+            gyro = GyroSamples(np.array([number]), np.zeros((1, 3)))
+            recorder.write(replace(small_frame(number), gyro=gyro), None)
+        writer.goes_on.set()
+    assert writer.written == list(range(20))
+    assert writer.gyro == [20, 21, 22]
 
 
 def test_no_frame_is_left_out_in_simulated_time(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from controller.errors import UserError
 from controller.replay.command import ReplayOptions, recorded_mount, run_replay
 from hal.cameras.tum_replay import TumReplay
 from hal.cameras.tum_writer import TumWriter
-from hal.types import Pose
+from hal.types import GyroSamples, Pose
 from tests.support.bags import camera_entries, write_bag
 from tests.support.recordings import small_frame
 from vision.scene import EgoMotion
@@ -124,6 +124,27 @@ def test_odometry_of_another_time_is_not_called_used(
             writer.write(small_frame(number), Pose(np.eye(3), np.zeros(3)) if number == 0 else None)
     run_replay(ReplayOptions(tmp_path, "auto", CONFIG_DIR / "replay.yaml", quiet=True))
     assert "odometry.txt: 1 poses; of the time of 2 of 3 frames there is none" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("late_ns", "told"),
+    [
+        (0, "odometry    none; gyro.txt: 9 readings of a gyro\n"),
+        (10**9, "gyro.txt: 9 readings of a gyro; of the time of 3 of 3 frames there is none\n"),
+    ],
+)
+def test_the_gyro_of_a_recording_is_used_unless_it_is_of_another_time_or_not_wanted(
+    late_ns: int, told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with TumWriter(tmp_path) as writer:
+        for number in range(3):
+            stamps_ns = small_frame(number).captured_ns + late_ns + np.arange(3) * 10_000_000
+            gyro = GyroSamples(stamps_ns, np.zeros((3, 3)))
+            writer.write(replace(small_frame(number), gyro=gyro))
+    run_replay(ReplayOptions(tmp_path, "auto", CONFIG_DIR / "replay.yaml", quiet=True))
+    assert told in capsys.readouterr().out
+    run_replay(ReplayOptions(tmp_path, "auto", CONFIG_DIR / "replay.yaml", quiet=True, use_gyro=False))
+    assert "readings of a gyro" not in capsys.readouterr().out
 
 
 def test_a_video_plays_at_the_pace_of_the_recording(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hal.types import Pose
+from hal.types import CameraMount, Pose
 from tests.support.anchored_points import (
     CAMERA,
     DT_S,
@@ -20,8 +20,9 @@ from tests.support.anchored_points import (
 )
 from vision.camera.lens import rotation_from_vector, vector_from_rotation
 from vision.ego_motion.camera_motion import _implausible, estimate
+from vision.ego_motion.forward_speed import ForwardSpeed
 from vision.ego_motion.lone_body import without_lone_body
-from vision.ego_motion.motion_prior import MotionPrior, odometry_prior, with_gyro
+from vision.ego_motion.motion_prior import MotionPrior, odometry_prior, rolling_prior, with_gyro
 from vision.ego_motion.reprojection import Anchors, View, view_of
 from vision.ego_motion.robust_fit import Fit
 from vision.scene import Obstacle
@@ -29,6 +30,13 @@ from vision.scene import Obstacle
 ALONG = np.array([1e5, 0.0, 30.0])  # covariance of a point on a blurred horizontal line, px^2
 CRATE_PX = (250.0, 120.0, 420.0, 360.0)
 AHEAD = Pose(np.eye(3), np.array([0.0, 0.0, 0.04]))
+
+
+def rolling(turn_sigma_radps: float | None) -> MotionPrior:
+    """The robot goes ahead; turn_sigma_radps: of its gyro, None if it has none."""
+    speed, mount = ForwardSpeed(0.04 / DT_S, 0.1), CameraMount(0.45, 0.0, 0.6, 0.0)
+    prior = rolling_prior(0.0, speed, DT_S, mount, SETTINGS, turn_sigma_radps)
+    return prior if turn_sigma_radps is None else with_gyro(prior, np.zeros(3), DT_S, SETTINGS)
 
 
 def obstacle(box_px: tuple[float, float, float, float], width_m: float = 1.0) -> Obstacle:
@@ -55,12 +63,16 @@ def plain_room(cornered: float = 0.0) -> tuple[Anchors, np.ndarray]:
     return replace(points, pixel_cov=covariance), crate
 
 
-def yaw_rad(prior: MotionPrior, true: Pose, aside_m: float = 0.0, cornered: float = 0.0) -> float:
-    """Estimated turn about y while the camera moves by true, and the crate by aside_m to the right."""
+def camera_pose(prior: MotionPrior, true: Pose, aside_m: float = 0.0, cornered: float = 0.0) -> Pose:
+    """The estimate while the camera moves by true, and the crate by aside_m to the right."""
     points, crate = plain_room(cornered)
     moved = points.points_m + np.where(crate[:, None], [aside_m, 0.0, 0.0], 0.0)
-    found = estimate(points, seen(moved, true), IDENTITY, prior, GLOBAL_SHUTTER, CAMERA, CRATE)
-    return float(vector_from_rotation(found.pose.rotation)[1])
+    return estimate(points, seen(moved, true), IDENTITY, prior, GLOBAL_SHUTTER, CAMERA, CRATE).pose
+
+
+def yaw_rad(prior: MotionPrior, true: Pose, aside_m: float = 0.0, cornered: float = 0.0) -> float:
+    """Estimated turn about y; see camera_pose."""
+    return float(vector_from_rotation(camera_pose(prior, true, aside_m, cornered).rotation)[1])
 
 
 def turning(rad: float) -> Pose:
@@ -95,9 +107,22 @@ def test_without_odometry_the_images_tell_any_turn() -> None:
 
 def test_slip_explains_a_fifth_of_the_turn_and_some_noise() -> None:
     assert odometry_prior(turning(0.02), DT_S, SETTINGS).slip_rad == pytest.approx(0.2 * 0.02 + 0.02 * DT_S)
+
+
+def test_a_gyro_does_not_slip_but_drifts() -> None:
     turn = np.array([0.0, 0.01, 0.0])
     prior = odometry_prior(turning(0.02), DT_S, SETTINGS)
-    assert with_gyro(prior, turn, DT_S, SETTINGS).slip_rad == prior.slip_rad
+    assert with_gyro(prior, turn, DT_S, SETTINGS).slip_rad == pytest.approx(0.02 * DT_S)
+    assert rolling(0.02).knows_turn
+    assert not rolling(None).knows_turn
+
+
+def test_with_a_gyro_a_lone_crate_does_not_drive_the_camera_aside_where_there_is_no_odometry() -> None:
+    """0.45 m/s: without a gyro, the robot may turn, which swings its camera aside."""
+    swung = camera_pose(rolling(None), AHEAD, aside_m=0.015)
+    assert swung.translation_m[0] < -0.01
+    steady = camera_pose(rolling(0.02), AHEAD, aside_m=0.015)
+    np.testing.assert_allclose(steady.translation_m, AHEAD.translation_m, atol=1e-4)
 
 
 def view(points: Anchors) -> View:

@@ -13,6 +13,7 @@ from tests.support.point_motion import project
 from vision.camera.lens import rays, rotation_from_vector, vector_from_rotation
 from vision.ego_motion.camera_motion import estimate
 from vision.ego_motion.forward_speed import UNKNOWN_SPEED, ForwardSpeed
+from vision.ego_motion.motion_memory import MotionMemory
 from vision.ego_motion.motion_prior import (
     MotionPrior,
     SweepPrior,
@@ -137,3 +138,14 @@ def test_a_gyro_gives_the_rotation_and_how_sure_it_is() -> None:
     np.testing.assert_allclose(turned.sigma[:3], 0.02 * 0.1)
     np.testing.assert_allclose(turned.sigma[3:], prior.sigma[3:])
     assert (turned.source, turned.trusted) == (prior.source, prior.trusted)
+
+
+def test_a_gyro_also_tells_how_a_turn_swings_the_camera_of_a_robot() -> None:
+    known = rolling_prior(0.6, ForwardSpeed(0.0, 0.12), DT_S, LEVEL, SETTINGS, turn_sigma_radps=0.02)
+    np.testing.assert_allclose(known.motion.translation_m, [0.3 * 0.6 * DT_S, 0.0, 0.0], atol=1e-12)
+    np.testing.assert_allclose(known.sigma / DT_S, [0.25, 0.02, 0.25, math.hypot(0.1, 0.3 * 0.02), 0.1, 0.13])
+    memory = MotionMemory(LEVEL, SETTINGS)
+    turned = memory.prior(None, np.array([0.001, 0.02, -0.001]), DT_S)
+    np.testing.assert_allclose(turned.motion.translation_m, [0.3 * 0.02, 0.0, 0.0], atol=1e-12)
+    np.testing.assert_allclose(turned.sigma[:3], 0.02 * DT_S)
+    assert turned.sigma[3] == pytest.approx(math.hypot(0.1, 0.3 * 0.02) * DT_S)
