@@ -12,7 +12,7 @@ gyro_track.py, gyro_file.py - gyro readings over time, and from a text file
 tum_index.py, tum_replay.py - the index files of a folder, and the folder as a camera
 tum_writer.py - writes such a folder (--record)
 bag_file.py, bag_realsense.py - messages of a ROS bag, and the peculiarities of RealSense bags
-bag_topics.py - chooses the topics
+bag_topics.py, bag_exposures.py - choose the topics, and tell when their messages were taken
 bag_transforms.py, bag_calibration.py, bag_odometry.py, bag_gyro.py, bag_images.py - read the messages
 stamp_pairing.py - pairs colour and depth images that arrive one by one
 bag_replay.py - a ROS bag as a camera

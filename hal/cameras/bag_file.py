@@ -7,14 +7,15 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection, Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from types import TracebackType
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple, Self, TypeVar
 
 from hal.cameras.bag_realsense import message_of
 from hal.errors import BadRecording, DeviceNotFound
 
+_Item = TypeVar("_Item")
 _ROS_2 = (".db3", ".mcap")
 _SUFFIXES = (".bag", *_ROS_2)
 _METADATA = "metadata.yaml"
@@ -83,13 +84,17 @@ class BagFile:
     def messages(self, names: Collection[str]) -> Iterator[tuple[str, Any]]:
         """(topic, message) of these topics, in the order of the recording. Raises BadRecording where the bag
         is damaged; all messages before that are valid."""
+        return ((topic, message) for topic, _, message in self.stamped_messages(names))
+
+    def stamped_messages(self, names: Collection[str]) -> Iterator[tuple[str, int, Any]]:
+        """The same, with the time at which each was written, in nanoseconds: (topic, time, message)."""
         selected = [connection for connection in self._reader.connections if connection.topic in names]
         if not selected:
             return
         records = self._reader.messages(connections=selected)
         while True:
             try:
-                connection, _, data = next(records)
+                connection, written_ns, data = next(records)
                 if not self._reader.is2:
                     data = message_of(connection.topic, connection.msgtype, data)
                 message = self._reader.deserialize(data, connection.msgtype)
@@ -97,11 +102,17 @@ class BagFile:
                 return
             except Exception as error:
                 raise BadRecording(f"{self.path}: is damaged from here on ({_one_line(error)})") from error
-            yield connection.topic, message
+            yield connection.topic, int(written_ns), message
 
     def first(self, name: str) -> Any:
         """The first message of a topic; None if it has none."""
         return next((message for _, message in self.messages((name,))), None)
+
+
+def until_damage(messages: Iterator[_Item]) -> Iterator[_Item]:
+    """Those before the first damage, which is reported when the images are read."""
+    with suppress(BadRecording):
+        yield from messages
 
 
 def _one_line(error: Exception) -> str:

@@ -2,24 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from hal.cameras.bag_exposures import header_ns
 from hal.cameras.bag_file import BagFile
 from hal.cameras.bag_transforms import StaticTransforms, frame_name
 from hal.cameras.pose_track import PoseTrack, quaternion_of, rotation_matrix
-from hal.clocks import NS_PER_S
 from hal.errors import BadRecording
 from hal.types import FloatArray
 
 _UNIT_TOLERANCE = 0.01
-
-
-def stamp_ns(message: Any) -> int:
-    """The time in a message's header."""
-    stamp = message.header.stamp
-    return int(stamp.sec) * NS_PER_S + int(stamp.nanosec)
 
 
 def read_odometry(bag: BagFile, topic: str, camera: str, transforms: StaticTransforms) -> PoseTrack:
@@ -37,7 +29,7 @@ def read_odometry(bag: BagFile, topic: str, camera: str, transforms: StaticTrans
                 f"{bag.path}: {topic}: pose {len(rows) + 1} is none; replay it with --odometry none"
             )
         values[3:] /= length
-        rows.setdefault(stamp_ns(message), values)
+        rows.setdefault(header_ns(message), values)
     mount = None if base is None else transforms.find(base, camera)
     if mount is None:
         raise BadRecording(

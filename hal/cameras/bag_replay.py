@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from itertools import islice, pairwise
 from pathlib import Path
 from statistics import median
@@ -13,10 +13,11 @@ from typing import Any, Self
 
 from config.camera import OdometryChoice
 from hal.cameras.bag_calibration import read_calibration, read_transforms
-from hal.cameras.bag_file import BagFile
-from hal.cameras.bag_gyro import read_gyro
+from hal.cameras.bag_exposures import Exposures
+from hal.cameras.bag_file import BagFile, until_damage
+from hal.cameras.bag_gyro import ColourCamera, read_gyro
 from hal.cameras.bag_images import colour_image, depth_image
-from hal.cameras.bag_odometry import read_odometry, stamp_ns
+from hal.cameras.bag_odometry import read_odometry
 from hal.cameras.bag_topics import BagTopics, WantedTopics, choose_topics
 from hal.cameras.bag_transforms import StaticTransforms
 from hal.cameras.calibration import RecordingCalibration
@@ -38,8 +39,7 @@ class BagReplay:
     """Recording over the images of a bag of ROS 1 or ROS 2, or of a RealSense viewer (.db3).
 
     The constructor reads topics, calibration and odometry (raises BadRecording, and DeviceNotFound if rosbags
-    is not installed); images are read after entering. captured_ns is the time in the header of the colour
-    image.
+    is not installed); images are read after entering. captured_ns is the time of the colour image.
     odometry: the chosen poses, None if there are none. gyro: its readings, None if there are none or they are
     not to be used. Entering again starts from the beginning.
     """
@@ -58,11 +58,11 @@ class BagReplay:
             transforms = read_transforms(bag)
             camera, frame, notes = read_calibration(bag, self._topics, transforms)
             self.odometry, odometry_notes = _odometry(bag, self._topics, odometry, frame, transforms)
-            colour = self._topics.colour.name
-            self.gyro, gyro_notes = (
-                read_gyro(bag, wanted.gyro, colour, frame, transforms) if use_gyro else (None, ())
-            )
-            self.fps = _estimate_fps(bag, colour)
+            colour, depth = self._topics.colour.name, self._topics.depth.name
+            self._exposures = Exposures(bag, (colour, depth))
+            of = ColourCamera(colour, frame, self._exposures.clock)
+            self.gyro, gyro_notes = read_gyro(bag, wanted.gyro, of, transforms) if use_gyro else (None, ())
+            self.fps = _estimate_fps(bag, colour, self._exposures)
         self._calibration = RecordingCalibration(camera)
         self._notes = (*notes, *odometry_notes, *gyro_notes)
         self._messages: Iterator[tuple[str, Any]] | None = None
@@ -172,7 +172,7 @@ class BagReplay:
             self._messages_read += 1
             is_colour = topic == self._topics.colour.name
             stream = self._pairing.colour if is_colour else self._pairing.depth
-            stream.add(stamp_ns(message), message)
+            stream.add(self._exposures.stamp_ns(topic, message), message)
         self._pairs.extend(self._pairing.pairs(self._ended))
 
     def _finish(self) -> None:
@@ -207,14 +207,11 @@ class BagReplay:
         )
 
 
-def _estimate_fps(bag: BagFile, topic: str) -> float | None:
+def _estimate_fps(bag: BagFile, topic: str, exposures: Exposures) -> float | None:
     """The rate of the first images. The duration of the bag cannot be used, because other topics may begin
     earlier and end later."""
-    stamps_ns = []
-    # Damage is reported when the frames are read.
-    with suppress(BadRecording):
-        for _, message in islice(bag.messages((topic,)), _FPS_SAMPLE):
-            stamps_ns.append(stamp_ns(message))
+    first = islice(until_damage(bag.messages((topic,))), _FPS_SAMPLE)
+    stamps_ns = [exposures.stamp_ns(topic, message) for _, message in first]
     gaps_ns = [after - before for before, after in pairwise(stamps_ns) if after > before]
     return NS_PER_S / median(gaps_ns) if gaps_ns else None
 

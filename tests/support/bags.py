@@ -122,6 +122,9 @@ class Ros:
         )
         return self.make("tf2_msgs/msg/TFMessage", transforms=[stamped])
 
+    def text(self, data: str) -> Any:
+        return self.make("std_msgs/msg/String", data=data)
+
     def imu(self, stamp_ns: int, frame: str, rates_radps: Sequence[float]) -> Any:
         x, y, z = rates_radps
         level = self.make("geometry_msgs/msg/Quaternion", x=0.0, y=0.0, z=0.0, w=1.0)
