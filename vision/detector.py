@@ -42,6 +42,9 @@ from vision.scene import CameraCondition, CameraHealth, EgoMotion
 
 _IDENTITY = Pose(np.eye(3), np.zeros(3))
 _NO_SWEEP = np.zeros(2)
+# A search for new fragments takes about a millisecond, which there is time for in every frame at 30 Hz. At a
+# lower rate there is time for several in a frame, and the image must not take longer to be searched.
+_TURN_S = 1.0 / 30.0
 
 
 class Detector:
@@ -138,11 +141,12 @@ class Detector:
         )
         on_movers = excluded & ~store.body_only
         store.keep(~self._renewal.crowded(store.ends_px, on_movers, grey.shape))
+        turns = max(round(dt_s / _TURN_S), 1)
+        looked = previous is not None and self._look_closer(frame, grey, previous.needs_fragments, turns)
         # A look at a body takes the place of a renewal, but never twice in a row.
-        looked = previous is not None and self._look_closer(frame, grey, previous.needs_fragments)
-        self._renewed = not (looked and self._renewed)
+        self._renewed = turns > 1 or not (looked and self._renewed)
         if self._renewed:
-            self._renew(frame, grey)
+            self._renew(frame, grey, turns)
         if ego.source != "visual" or blurred:
             store.break_history()
         self._commit(frame, images, odometry, found.sweep_rad)
@@ -211,16 +215,19 @@ class Detector:
                 return on_floor(grid, floor, self._config.depth_noise)
         return grid
 
-    def _renew(self, frame: RgbdFrame, grey: GreyImage) -> None:
+    def _renew(self, frame: RgbdFrame, grey: GreyImage, turns: int = 1) -> None:
         without_depth = int(np.count_nonzero(np.isnan(self._store.near_m).all(axis=1)))
-        new = self._renewal.find(frame, grey, self._store.ends_px, without_depth)
+        new = self._renewal.find(frame, grey, self._store.ends_px, without_depth, turns)
         self._store.add(new.ends_px, new.near_m, new.far_m, new.pixel_cov)
 
-    def _look_closer(self, frame: RgbdFrame, grey: GreyImage, bodies: NeedsFragments) -> bool:
-        new = self._attention.find(frame, grey, self._store.ends_px, bodies)
-        if new is not None:
+    def _look_closer(self, frame: RgbdFrame, grey: GreyImage, bodies: NeedsFragments, turns: int) -> bool:
+        """Look at one body a turn, while it is the turn of any. Whether at least one was looked at."""
+        for turn in range(turns):
+            new = self._attention.find(frame, grey, self._store.ends_px, bodies)
+            if new is None:
+                return turn > 0
             self._store.add(new.ends_px, new.near_m, new.far_m, new.pixel_cov, body_only=True)
-        return new is not None
+        return True
 
     def _commit(
         self, frame: RgbdFrame, images: Pyramid, odometry: Pose | None, sweep_rad: FloatArray

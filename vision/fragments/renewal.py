@@ -23,7 +23,7 @@ from vision.fragments.candidates import (
 from vision.fragments.edges import GreyImage, find_edges
 from vision.fragments.segments import find_segments, longest_first
 
-PART_PX = (240, 160)  # rows, columns: as much as a frame has time for; a 640x480 image has eight parts
+PART_PX = (240, 160)  # rows, columns: as much as a turn has time for; a 640x480 image has eight parts
 _BLOCKS = 2  # per part, one above the other: each has its own threshold of contrast
 _MARGIN_PX = 8  # around a part: a segment across its border is found from either side
 _MANY_MISSING = 8  # if more than 1/8 of the fragments are missing, a whole column of parts is searched
@@ -63,14 +63,20 @@ class Renewal:
         return self._config.fragments.max_fragments - present
 
     def find(
-        self, frame: RgbdFrame, grey: GreyImage, ends_px: NDArray[np.float32], without_depth: int
+        self,
+        frame: RgbdFrame,
+        grey: GreyImage,
+        ends_px: NDArray[np.float32],
+        without_depth: int,
+        turns: int = 1,
     ) -> NewFragments:
         """New fragments for the tiles that hold too few ends of the present ones, ends_px (N, 2, 2).
 
         The part of the image that was searched longest ago is searched. If many fragments are missing, it is
         a column of such parts; if there are no fragments at all, all parts; if few are missing, none.
 
-        without_depth: how many of the present fragments have no depth; only a small share may.
+        without_depth: how many of the present fragments have no depth; only a small share may. turns: for how
+        many frames' worth of parts there is time.
         """
         settings = self._config.fragments
         rows, columns = (max(1, round(size / part)) for size, part in zip(grey.shape, PART_PX, strict=True))
@@ -85,7 +91,7 @@ class Renewal:
         height, width = grey.shape
         counts = _tile_counts(np.ascontiguousarray(ends_px), settings.tile_px, height, width)
         parts = rows if room * _MANY_MISSING > settings.max_fragments else 1
-        chosen = np.argsort(self._last_visit, kind="stable")[: parts if len(ends_px) else None]
+        chosen = np.argsort(self._last_visit, kind="stable")[: parts * turns if len(ends_px) else None]
         self._last_visit[chosen] = self._visits
         found = [self._segments(grey, counts, part % rows, part // rows) for part in chosen.tolist()]
         far_room = max(0, int(_SHARE_WITHOUT_DEPTH * settings.max_fragments) - without_depth)
