@@ -135,3 +135,32 @@ def test_look_at_a_body_takes_the_place_of_every_second_renewal(
     watch(ahead())
     assert len(renewed) == pytest.approx(renewals, abs=1)
     assert looks == (max(np.diff(renewed)) == 2)
+
+
+@pytest.mark.parametrize(("every", "turns"), [(1, 1), (3, 3), (4, 4)])
+def test_at_a_lower_frame_rate_as_much_is_searched_in_the_same_time(
+    every: int, turns: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """At 10 Hz three bodies are looked at, and three times as many parts are searched, in every frame."""
+    looked: list[int] = []
+    renewed: list[int] = []
+    find = Renewal.find
+
+    def noted(self: Renewal, frame: RgbdFrame, *rest: Any) -> NewFragments:
+        renewed.append(rest[-1])
+        return find(self, frame, *rest)
+
+    def look(_self: Attention, frame: RgbdFrame, *_: object) -> NewFragments:
+        looked.append(frame.sequence)
+        return NOTHING_NEW
+
+    monkeypatch.setattr(Renewal, "find", noted)
+    monkeypatch.setattr(Attention, "find", look)
+    take = ahead()
+    watch(replace(take, frames=take.frames[::every], cameras=take.cameras[::every]))
+    assert renewed[0] == 1  # the first frame is searched all over, whatever its turns
+    assert set(renewed[1:]) == {turns}
+    later = [frame.sequence for frame in take.frames[::every]][1:]
+    assert looked == [sequence for sequence in later for _ in range(turns)]
+    if turns > 1:
+        assert len(renewed) == len(take.frames[::every])

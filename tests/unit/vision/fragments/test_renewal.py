@@ -58,6 +58,23 @@ def test_later_the_image_is_searched_part_by_part_and_a_whole_band_if_many_are_m
     assert seen >= {(row, column) for row in range(2) for column in range(4)}
 
 
+@pytest.mark.parametrize(("missing", "turns", "parts"), [(15, 3, 3), (40, 2, 4), (40, 4, 8)])
+def test_where_there_is_time_for_several_turns_as_many_parts_are_searched(
+    missing: int, turns: int, parts: int
+) -> None:
+    frame, grey = picture()
+    config = PerceptionConfig(fragments=FragmentSettings(max_fragments=160))
+    searched, each = Renewal(config), Renewal(config)
+    at_once = searched.find(frame, grey, present(160 - missing), 0, turns)
+    one_by_one = [each.find(frame, grey, present(160 - missing), 0) for _ in range(turns)]
+    found = set.union(*(parts_of(new.ends_px) for new in one_by_one))
+    assert parts_of(at_once.ends_px) <= found
+    assert len(found) >= parts
+    # The next search goes on where this one ended.
+    after = searched.find(frame, grey, present(160 - missing), 0)
+    np.testing.assert_array_equal(after.ends_px, each.find(frame, grey, present(160 - missing), 0).ends_px)
+
+
 def test_no_more_than_there_is_room_for() -> None:
     frame, grey = picture()
     config = PerceptionConfig(fragments=FragmentSettings(max_fragments=30))
