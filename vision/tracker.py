@@ -48,6 +48,9 @@ from vision.percept import Percept
 from vision.scene import IMPLAUSIBLE_SPEED_FACTOR, CameraCondition, FreeSpace, Scene
 
 _ACCEL_DENSITY = 0.08  # (m/s^2)^2 s, as people start, stop and turn: a sigma of 0.28 m/s after 1 s
+# For so long after a frame in which few fragments fit one motion of the camera, the views before it may be
+# out of place by more than the margin of arrivals. Static surfaces would seem to have arrived.
+_OUT_OF_PLACE_NS, _NEVER_NS = 200_000_000, -(2**62)
 _FORGET_S = 0.5  # a mover behind a post is visible again by then; the decision remembers for longer
 _FORGET_YOUNG_S = 0.15  # a few frames, for a track that was hardly seen: it is taken for a speckle
 
@@ -67,6 +70,7 @@ class Tracker:
         self._fragment_ids = np.empty(0, np.int64)
         self._fragment_owner = np.empty(0, np.int64)
         self._last_ns: int | None = None
+        self._blurred_ns = _NEVER_NS
 
     def step(self, detection: Detection, robot_pose: PlanarPose | None) -> Percept:
         """Track through one detection; call in the order of time."""
@@ -74,7 +78,9 @@ class Tracker:
         if detection.restarted:
             tracks.clear()
             self._surfaces = masks.NO_TRACK_SURFACES
-            self._last_ns = None  # time itself may have stepped back
+            self._last_ns, self._blurred_ns = None, _NEVER_NS  # time itself may have stepped back
+        if detection.blurred:
+            self._blurred_ns = detection.captured_ns
         if detection.restarted or not detection.motion_known:
             self._free.clear()
         if detection.restarted or detection.blurred or not detection.motion_known:
@@ -242,6 +248,8 @@ class Tracker:
         tracks.rim_s = rim_motion.one_way_s(tracks.rim_s, rims, settings.sigmas, dt_s)
         advances = tracks.update_trailing_average(dt_s)
         noise = self._config.depth_noise
+        if detection.captured_ns - self._blurred_ns <= _OUT_OF_PLACE_NS:
+            arrivals = np.zeros_like(arrivals)
         seen = evidence_of(tracks, detection, body, advances, arrivals, cells, rims, nearing, noise)
         verdict = judge(seen, tracks.evidence, tracks.moving, dt_s, settings)
         tracks.evidence, tracks.moving = verdict.evidence, verdict.moving
