@@ -23,6 +23,7 @@ from tests.support.software_realsense import (
     COLOUR_FX,
     DEPTH_FX,
     DEPTH_LEFT_OF_COLOUR_M,
+    FPS,
     HEIGHT,
     SERIAL,
     WIDTH,
@@ -46,9 +47,10 @@ def colour_image(value: int) -> ColourImage:
 @pytest.fixture
 def camera(device: SoftwareRealsense) -> Iterator[RealsenseCamera]:
     """Opened over the software device; its frame 0 has been sent and used up by the opening."""
-    driver = RealsenseCamera(
-        RealsenseCameraConfig(serial=SERIAL, gyro=True, latency_s=0.0), MonotonicClock(), device.vendor
+    config = RealsenseCameraConfig(
+        serial=SERIAL, width=WIDTH, height=HEIGHT, fps=FPS, gyro=True, latency_s=0.0
     )
+    driver = RealsenseCamera(config, MonotonicClock(), device.vendor)
     with ExitStack() as stack:
         helper = stack.enter_context(ThreadPoolExecutor(1))
         opening = helper.submit(driver.__enter__)
