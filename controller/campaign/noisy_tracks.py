@@ -11,6 +11,7 @@ from config.camera import SimulatedCameraConfig
 from controller.campaign.noise_model import NoiseModel
 from controller.campaign.view import Eye, PlanarCamera, PlanarView
 from hal.compiled import compiled, inlined
+from hal.directions import along_and_left
 from hal.types import FloatArray
 from vision.scene import Obstacle
 
@@ -238,16 +239,15 @@ def _reported(
     for k in range(count):
         track = tracks[k]
         errors = track[_ERRORS:]
-        dx, dy = track[_X] - camera_x, track[_Y] - camera_y
-        ahead, left = dx * cos + dy * sin, dy * cos - dx * sin
+        ahead, left = along_and_left(track[_X] - camera_x, track[_Y] - camera_y, cos, sin)
         if track[_SIGHTINGS] < noise.sightings or not ahead > 0.0:
             continue
         seen_ahead = ahead + depth_sigma_1pm * ahead * ahead * errors[0]
         seen_left = left + noise.lateral_sigma_m * errors[1]
         radial = noise.radial_velocity_mps + noise.radial_velocity_per_m * ahead
         lateral = noise.lateral_velocity_mps + noise.lateral_velocity_per_m * ahead
-        away_mps = track[_VX] * cos + track[_VY] * sin + radial * errors[2]
-        left_mps = track[_VY] * cos - track[_VX] * sin + lateral * errors[3]
+        away_mps, left_mps = along_and_left(track[_VX], track[_VY], cos, sin)
+        away_mps, left_mps = away_mps + radial * errors[2], left_mps + lateral * errors[3]
         initial = noise.first_velocity_mps * math.exp(-(t_s - track[_FIRST_S]) / noise.first_velocity_decay_s)
         radial, lateral = (radial + initial) ** 2, (lateral + initial) ** 2
         vertical = (_VERTICAL_SIGMA_MPS + initial) ** 2

@@ -8,6 +8,7 @@ import numpy as np
 
 from controller.campaign.stage import Stage
 from hal.compiled import compiled
+from hal.directions import along_and_left
 from hal.types import FloatArray, PlanarPose
 from sim.planar import PlanarWorld
 
@@ -75,8 +76,8 @@ def _ray_lengths(
     forward, left = np.empty(corners), np.empty(corners)
     for polygon in polygons:
         for j in range(corners):
-            dx, dy = polygon[j, 0] - x_m, polygon[j, 1] - y_m
-            forward[j], left[j] = dx * cos + dy * sin - front_m, dy * cos - dx * sin
+            along_m, left[j] = along_and_left(polygon[j, 0] - x_m, polygon[j, 1] - y_m, cos, sin)
+            forward[j] = along_m - front_m
         for j in range(corners):
             next_corner = (j + 1) % corners
             for ray in range(len(nearest)):

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from config.camera import SimulatedCameraConfig
 from config.robot import Mount
 from hal.compiled import compiled, inlined
+from hal.directions import along_and_left
 from hal.records import record
 from hal.types import FloatArray, Integers, Matrix, PlanarPose, Vector
 from sim.planar import PlanarWorld
@@ -122,8 +123,9 @@ def _in_camera(
     camera_x, camera_y, cos, sin = eye
     count = len(polygon)
     for j in range(count + 1):
-        dx, dy = polygon[j % count, 0] - camera_x, polygon[j % count, 1] - camera_y
-        forward[j], right[j] = dx * cos + dy * sin, dx * sin - dy * cos
+        x, y = polygon[j % count]
+        forward[j], left = along_and_left(x - camera_x, y - camera_y, cos, sin)
+        right[j] = -left
 
 
 @inlined

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.compiled import compiled, inlined
+from hal.directions import along_and_left
 from hal.records import record
 from hal.types import Flags, FloatArray, Integers, Matrices, Matrix, Vector
 
@@ -134,8 +135,8 @@ def covering(bodies: Bodies, points_m: FloatArray, reach_m: FloatArray, side_m: 
         half_view_m, half_across_m = bodies.half_view_m[k], bodies.half_across_m[k] + side_m
         for i in range(len(points_m)):
             dx, dy = points_m[i, 0] - bodies.xy_m[k, 0], points_m[i, 1] - bodies.xy_m[k, 1]
-            along_m, across_m = abs(dx * cos + dy * sin), abs(dy * cos - dx * sin)
-            covered[i, k] = along_m <= half_view_m + reach_m[i] and across_m <= half_across_m
+            along_m, left_m = along_and_left(dx, dy, cos, sin)
+            covered[i, k] = abs(along_m) <= half_view_m + reach_m[i] and abs(left_m) <= half_across_m
     return covered
 
 

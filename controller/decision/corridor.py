@@ -15,6 +15,7 @@ from controller.decision.bodies import Bodies
 from controller.path.path import Path
 from controller.path.projection import Projection, located
 from hal.compiled import compiled, inlined
+from hal.directions import along_and_left
 from hal.records import record
 from hal.types import FloatArray, Matrix, Vector
 
@@ -187,9 +188,9 @@ def _seen_along(bodies: Bodies, heading_rad: FloatArray) -> FloatArray:
     for k in range(len(heading_rad)):
         cos, sin = math.cos(heading_rad[k]), math.sin(heading_rad[k])
         x, y = bodies.velocity_mps[k]
-        along[k], left[k] = x * cos + y * sin, y * cos - x * sin
+        along[k], left[k] = along_and_left(x, y, cos, sin)
         x, y = bodies.innovation_mps[k]
-        more_along[k], more_left[k] = x * cos + y * sin, y * cos - x * sin
+        more_along[k], more_left[k] = along_and_left(x, y, cos, sin)
         spread = bodies.covariance[k]
         xx, yy = spread[0, 0], spread[1, 1]
         turned = (spread[0, 1] + spread[1, 0]) * cos * sin

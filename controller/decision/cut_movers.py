@@ -13,8 +13,9 @@ from dataclasses import replace
 import numpy as np
 
 from controller.decision.bodies import Bodies
-from controller.decision.view_edges import ViewEdges
+from controller.decision.view_edges import ViewEdges, ahead_and_left
 from hal.compiled import compiled
+from hal.directions import along_and_left
 from hal.types import CameraMount, FloatArray, PlanarPose
 
 # How much nearer it may extend: about the width of a vehicle in a hall.
@@ -55,14 +56,13 @@ def _hidden(
     cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
     hidden_m = np.zeros(len(bodies.moving))
     for k in range(len(hidden_m)):
-        dx, dy = bodies.xy_m[k, 0] - pose.x_m, bodies.xy_m[k, 1] - pose.y_m
-        near_m = dx * cos + dy * sin - mount.forward_m - bodies.half_view_m[k]
-        left_m = dy * cos - dx * sin - mount.left_m
+        ahead_m, left_m = ahead_and_left(bodies.xy_m[k], pose, mount)
+        near_m, inner_m = ahead_m - bodies.half_view_m[k], abs(left_m) - bodies.half_across_m[k]
         vx, vy = bodies.velocity_mps[k]
-        along_mps, inwards_mps = abs(vx * cos + vy * sin), math.copysign(1.0, left_m) * (vx * sin - vy * cos)
-        inner_m = abs(left_m) - bodies.half_across_m[k]
+        along_mps, leftward_mps = along_and_left(vx, vy, cos, sin)
+        inwards_mps = -math.copysign(1.0, left_m) * leftward_mps
         on_edge = inner_m >= (1.0 - _INSIDE_SHARE) * edges.edge_tan * near_m - _INSIDE_M
-        comes_in = inwards_mps > max(along_mps, _MIN_INWARDS_MPS)
+        comes_in = inwards_mps > max(abs(along_mps), _MIN_INWARDS_MPS)
         if bodies.moving[k] and near_m > least_m and on_edge and comes_in:
             hidden_m[k] = min(_HIDDEN_M, near_m - least_m)
     return hidden_m

@@ -16,10 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.decision.bodies import Bodies
-from controller.decision.view_edges import ViewEdges, beyond_edges
+from controller.decision.view_edges import (
+    ViewEdges,
+    ahead_and_left,
+    all_ahead_and_left,
+    beyond_edges,
+)
 from hal.compiled import compiled
 from hal.geometry import wrap_angle_rad
-from hal.types import CameraMount, FloatArray, PlanarPose
+from hal.types import CameraMount, PlanarPose
 from vision.scene import FreeSpace
 
 # Only bodies this far inside the side edges are judged: a smaller distance may be an error of the robot's
@@ -59,14 +64,14 @@ class SeenThrough:
             self.forget()
             self._heading_rad = pose.heading_rad
         now_ns = bodies.captured_ns
-        ahead, right = _in_camera(bodies, pose, self._mount)
+        ahead, left = all_ahead_and_left(bodies.xy_m, pose, self._mount)
         near, far = ahead - bodies.half_view_m, ahead + bodies.half_view_m
         in_view = ~bodies.moving & (near > 0.0)
         in_view &= ~beyond_edges(bodies, near, self._mount.height_m, edges)
-        in_view &= np.abs(right) + bodies.half_across_m <= edges.edge_tan * near - _WELL_INSIDE_M
+        in_view &= np.abs(left) + bodies.half_across_m <= edges.edge_tan * near - _WELL_INSIDE_M
         ids, since_ns = bodies.ids.tolist(), {}
         for k in in_view.nonzero()[0].tolist():
-            bands = _bands(free, right[k], float(bodies.half_across_m[k]), float(near[k]), float(far[k]))
+            bands = _bands(free, -left[k], float(bodies.half_across_m[k]), float(near[k]), float(far[k]))
             if _is_free(free, bands, float(far[k])):
                 since_ns[ids[k]] = self._since_ns.get(ids[k], now_ns)
         self._since_ns = since_ns
@@ -82,16 +87,9 @@ def unproven(
     """
     unseen = _unproven(bodies, pose, mount, free)
     if np.count_nonzero(unseen):
-        ahead, _ = _in_camera(bodies, pose, mount)
+        ahead, _ = all_ahead_and_left(bodies.xy_m, pose, mount)
         unseen &= ~beyond_edges(bodies, ahead - bodies.half_view_m, mount.height_m, edges)
     return unseen
-
-
-def _in_camera(bodies: Bodies, pose: PlanarPose, mount: CameraMount) -> tuple[FloatArray, FloatArray]:
-    """(N,) each: how far ahead and to the right of the camera the centres are."""
-    cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
-    offset = bodies.xy_m - (pose.x_m, pose.y_m)
-    return offset @ (cos, sin) - mount.forward_m, mount.left_m - offset @ (-sin, cos)
 
 
 def _bands(
@@ -115,18 +113,16 @@ def _is_free(free: FreeSpace, bands: NDArray[np.bool_], far_m: float) -> bool:
 @compiled(Bodies, PlanarPose, CameraMount, FreeSpace)
 def _unproven(bodies: Bodies, pose: PlanarPose, mount: CameraMount, free: FreeSpace) -> NDArray[np.bool_]:
     """As unproven(), but for bodies below or above the view."""
-    cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
     unseen = np.zeros(len(bodies.moving), np.bool_)
     for k in range(len(unseen)):
-        dx, dy = bodies.xy_m[k, 0] - pose.x_m, bodies.xy_m[k, 1] - pose.y_m
-        ahead, right = dx * cos + dy * sin - mount.forward_m, mount.left_m - (dy * cos - dx * sin)
+        ahead, left = ahead_and_left(bodies.xy_m[k], pose, mount)
         half_view_m, half_across_m = bodies.half_view_m[k], bodies.half_across_m[k]
         near, far = ahead - half_view_m, ahead + half_view_m
         speed_mps = math.hypot(bodies.measured_mps[k, 0], bodies.measured_mps[k, 1])
         stood = not bodies.moving[k] and bodies.tracked_s[k] >= _STOOD_S and speed_mps <= _STOOD_MPS
         if not (stood and 0.0 < near <= _NEAR_M):
             continue
-        left_edge, right_edge = right - half_across_m, right + half_across_m
+        left_edge, right_edge = -left - half_across_m, -left + half_across_m
         first = min(left_edge / near, left_edge / far) - free.half_width_tan
         last = max(right_edge / near, right_edge / far) + free.half_width_tan
         covered, seen_free, there = 0, 0, False

@@ -11,6 +11,7 @@ from config.perception import TYPICAL_DEPTH_NOISE, DepthNoise
 from controller.decision.bodies import Bodies, covering
 from controller.decision.situation import SceneError
 from hal.compiled import compiled, inlined
+from hal.directions import along_and_left
 from hal.records import record
 from hal.types import CameraMount, FloatArray, PlanarPose
 from vision.scene import FreeSpace
@@ -176,10 +177,9 @@ def _surfaces(
 def _band_at(free: FreeSpace, eye: Eye, x_m: float, y_m: float) -> tuple[float, int]:
     """As bands_at(), for one point."""
     eye_x, eye_y, cos, sin = eye
-    dx, dy = x_m - eye_x, y_m - eye_y
-    forward, right = dx * cos + dy * sin, dx * sin - dy * cos
+    forward, left = along_and_left(x_m - eye_x, y_m - eye_y, cos, sin)
     first_tan, width_tan = free.bearing_tan[0] - free.half_width_tan, 2.0 * free.half_width_tan
-    band = (right / max(forward, 1e-3) - first_tan) / width_tan
+    band = (-left / max(forward, 1e-3) - first_tan) / width_tan
     return forward, math.floor(band) if math.isfinite(band) else -1
 
 

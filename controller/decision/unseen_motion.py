@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from controller.decision.bodies import Bodies
 from hal.compiled import compiled, inlined
+from hal.directions import along_and_left
 from hal.types import FloatArray, PlanarPose
 
 BoolArray = NDArray[np.bool_]
@@ -81,10 +82,11 @@ def may_enter_way(bodies: Bodies, k: int, pose: PlanarPose) -> bool:
     _ALONG_TO_OUTWARD_RATIO times as fast forward as outwards), from where it may cut in.
     """
     cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
+    _, left_m = along_and_left(bodies.xy_m[k, 0] - pose.x_m, bodies.xy_m[k, 1] - pose.y_m, cos, sin)
     vx, vy = bodies.velocity_mps[k]
-    left = (bodies.xy_m[k, 1] - pose.y_m) * cos - (bodies.xy_m[k, 0] - pose.x_m) * sin
-    leftward, forward = vy * cos - vx * sin, vx * cos + vy * sin
-    return bool(left * leftward < 0.0 or forward > _ALONG_TO_OUTWARD_RATIO * abs(leftward))
+    forward_mps, leftward_mps = along_and_left(vx, vy, cos, sin)
+    towards_axis = left_m * leftward_mps < 0.0
+    return bool(towards_axis or forward_mps > _ALONG_TO_OUTWARD_RATIO * abs(leftward_mps))
 
 
 def with_measured_velocity(bodies: Bodies, mistaken_mps: float) -> Bodies:
@@ -166,12 +168,13 @@ def _unseen_or_approaching(bodies: Bodies, widest_half_m: FloatArray, pose: Plan
         if bodies.moving[k] or hardly_tracked or widest_half_m[k] <= MIN_MOVER_HALF_WIDTH_M:
             continue
         out[k] = bodies.unseen_s[k] > 0.0
-        left_m = (bodies.xy_m[k, 1] - pose.y_m) * cos - (bodies.xy_m[k, 0] - pose.x_m) * sin
-        left_mps = bodies.measured_mps[k, 1] * cos - bodies.measured_mps[k, 0] * sin
+        _, left_m = along_and_left(bodies.xy_m[k, 0] - pose.x_m, bodies.xy_m[k, 1] - pose.y_m, cos, sin)
+        vx, vy = bodies.measured_mps[k]
+        _, leftward_mps = along_and_left(vx, vy, cos, sin)
         variance = leftward_variance(bodies.covariance[k], cos, sin)
         sigmas, least_mps = _APPROACH_MIN_SIGMAS, _APPROACH_MIN_MPS
         if _PERSON_FROM_M <= bodies.top_m[k] <= _PERSON_TO_M:
             sigmas, least_mps = _PERSON_MIN_SIGMAS, _PERSON_MIN_MPS
         clear_mps = max(sigmas * math.sqrt(variance), least_mps)
-        comes[k] = not out[k] and -np.sign(left_m) * left_mps > clear_mps
+        comes[k] = not out[k] and -np.sign(left_m) * leftward_mps > clear_mps
     return answers

@@ -13,8 +13,14 @@ import numpy as np
 
 from controller.decision.bodies import Bodies
 from controller.decision.unseen_motion import leftward_variance, significant_component
-from controller.decision.view_edges import ViewEdges, beyond_edges
+from controller.decision.view_edges import (
+    ViewEdges,
+    ahead_and_left,
+    all_ahead_and_left,
+    beyond_edges,
+)
 from hal.compiled import compiled
+from hal.directions import along_and_left
 from hal.types import CameraMount, FloatArray, PlanarPose
 from vision.scene import FreeSpace
 
@@ -39,13 +45,12 @@ def extrapolated(bodies: Bodies, dt_s: float, pose: PlanarPose, mount: CameraMou
     xy = np.empty(bodies.xy_m.shape)
     for k in range(len(xy)):
         vx, vy = bodies.velocity_mps[k]
-        dx, dy = bodies.xy_m[k, 0] - pose.x_m, bodies.xy_m[k, 1] - pose.y_m
-        left, leftward_mps = dy * cos - dx * sin - mount.left_m, vy * cos - vx * sin
-        side = -1.0 if left < 0.0 else 1.0
-        ahead = dx * cos + dy * sin - mount.forward_m - bodies.half_view_m[k] > 0.0
+        ahead, left = ahead_and_left(bodies.xy_m[k], pose, mount)
+        _, leftward_mps = along_and_left(vx, vy, cos, sin)
+        side, before_camera = -1.0 if left < 0.0 else 1.0, ahead - bodies.half_view_m[k] > 0.0
         variance = leftward_variance(bodies.covariance[k], cos, sin)
         past_m = 0.0
-        if bodies.moving[k] and ahead and -side * leftward_mps > math.sqrt(variance):
+        if bodies.moving[k] and before_camera and -side * leftward_mps > math.sqrt(variance):
             past_m = max(_MIN_AXIS_DISTANCE_M - side * (left + leftward_mps * dt_s), 0.0)
         xy[k, 0] = bodies.xy_m[k, 0] + vx * dt_s - side * past_m * sin
         xy[k, 1] = bodies.xy_m[k, 1] + vy * dt_s + side * past_m * cos
@@ -69,8 +74,7 @@ def pushed_out_of_view(
     """
     cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
     forward, leftward = np.array([cos, sin]), np.array([-sin, cos])
-    offset = bodies.xy_m - (pose.x_m, pose.y_m)
-    ahead, left = offset @ forward - mount.forward_m, offset @ leftward - mount.left_m
+    ahead, left = all_ahead_and_left(bodies.xy_m, pose, mount)
     near, far = ahead - bodies.half_view_m, ahead + bodies.half_view_m
     within = bodies.moving & (near > 0.0) & ~beyond_edges(bodies, near, mount.height_m, edges)
     if not np.count_nonzero(within):

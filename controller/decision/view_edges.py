@@ -2,8 +2,8 @@
 
 The lower edge falls from the camera's height to the floor at near_m ahead; the upper edge rises with the
 slope up_tan from the camera's height; the side edges are at the tangent edge_tan. Heights are over the floor,
-distances ahead of the camera. controller/decision/out_of_view.py, seen_through.py, standing_limits.py and
-sight.py ask.
+distances ahead of the camera or to its left (ahead_and_left). controller/decision/out_of_view.py,
+unseen_position.py, seen_through.py, cut_movers.py, standing_limits.py and sight.py ask.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from controller.decision.bodies import Bodies
 from hal.compiled import compiled, inlined
+from hal.directions import along_and_left
 from hal.records import record
 from hal.types import CameraMount, FloatArray, PlanarPose
 
@@ -56,6 +57,23 @@ def may_be_above_view_within_m(top_m: float, height_m: float, up_tan: float) -> 
     """Distance ahead of the camera below which something with its top at top_m may rise above the view."""
     rise_m = top_m - height_m
     return max(rise_m, 0.0) / max(up_tan, MIN_TAN)
+
+
+@inlined
+def ahead_and_left(point_m: FloatArray, pose: PlanarPose, mount: CameraMount) -> tuple[float, float]:
+    """How far a floor point (2,) is ahead of the camera of a robot at pose, and to its left."""
+    cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
+    along_m, left_m = along_and_left(point_m[0] - pose.x_m, point_m[1] - pose.y_m, cos, sin)
+    return along_m - mount.forward_m, left_m - mount.left_m
+
+
+@compiled("float64[:, :]", PlanarPose, CameraMount)
+def all_ahead_and_left(points_m: FloatArray, pose: PlanarPose, mount: CameraMount) -> FloatArray:
+    """(2, P) ahead_and_left() of floor points (P, 2)."""
+    places = np.empty((2, len(points_m)))
+    for k in range(len(points_m)):
+        places[0, k], places[1, k] = ahead_and_left(points_m[k], pose, mount)
+    return places
 
 
 @inlined
@@ -104,11 +122,9 @@ def out_of_view(
     pose: of the robot that carries the camera. A centre up to tolerance_m inside the side edge counts as
     beside the view; of a mover, tolerance_mps more for each second since it was last seen.
     """
-    cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
     out = np.empty(len(bodies.xy_m), np.bool_)
     for k in range(len(out)):
-        dx, dy = bodies.xy_m[k, 0] - pose.x_m, bodies.xy_m[k, 1] - pose.y_m
-        ahead, left = dx * cos + dy * sin - mount.forward_m, dy * cos - dx * sin - mount.left_m
+        ahead, left = ahead_and_left(bodies.xy_m[k], pose, mount)
         within_m = tolerance_m + (tolerance_mps * bodies.unseen_s[k] if bodies.moving[k] else 0.0)
         beside = abs(left) > edges.edge_tan * max(ahead, 0.0) - within_m
         near_face_m = ahead - bodies.half_view_m[k]

@@ -13,6 +13,7 @@ import numpy as np
 
 from controller.path.path_pieces import EXTENSION_M, Piece, along_arc
 from hal.compiled import compiled, inlined
+from hal.directions import along_and_left
 from hal.types import FloatArray, Integers
 
 # s_m, x_m, y_m, heading_rad and curvature_1pm of the pieces at their beginnings, (P,) each.
@@ -120,9 +121,8 @@ def _poses(chain: Chain, s_m: FloatArray) -> FloatArray:
 def _seen_from(chain: Chain, s_m: float, x_m: float, y_m: float) -> tuple[float, float, float, float]:
     """Where a point is relative to the path's pose at s_m: ahead, left; and heading and curvature there."""
     there_x_m, there_y_m, heading, bend = _pose_on(chain, s_m)
-    dx, dy = x_m - there_x_m, y_m - there_y_m
-    cos, sin = math.cos(heading), math.sin(heading)
-    return dx * cos + dy * sin, dy * cos - dx * sin, heading, bend
+    ahead, left = along_and_left(x_m - there_x_m, y_m - there_y_m, math.cos(heading), math.sin(heading))
+    return ahead, left, heading, bend
 
 
 @inlined
@@ -172,10 +172,9 @@ def _on_line(
     line: s_m, x_m and y_m of its beginning, and cosine and sine of its direction.
     """
     line_s_m, line_x_m, line_y_m, cos, sin = line
-    dx, dy = x_m - line_x_m, y_m - line_y_m
-    along, left = dx * cos + dy * sin + line_s_m, dy * cos - dx * sin
-    s_m = min(max(along, low_m), high_m)
-    return s_m, math.copysign(math.hypot(along - s_m, left), left)
+    along, left = along_and_left(x_m - line_x_m, y_m - line_y_m, cos, sin)
+    s_m = min(max(along + line_s_m, low_m), high_m)
+    return s_m, math.copysign(math.hypot(along + line_s_m - s_m, left), left)
 
 
 @inlined
