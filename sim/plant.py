@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 from config.plant import PlantConfig
 from hal.chassis.tracks import TrackGeometry
-from hal.clocks import NS_PER_S
+from hal.clocks import NS_PER_MS, NS_PER_S
 from hal.types import PlanarPose
 
 # Substep: 1 mm of travel at 1 m/s. Within it, speeds follow the exact exponential of the lag.
-_STEP_NS = 1_000_000
+_STEP_NS = NS_PER_MS
 # A slower base stands: the speed of a track nears its target exponentially and never gets there.
 PLANT_REST_MPS = 1e-3
 PLANT_REST_RADPS = 1e-3

@@ -23,7 +23,7 @@ from sim.rendering.camera import SimulatedCamera
 from sim.rendering.render import Picture
 from sim.world import World
 
-_MAX_DEPTH_M = 10.0
+_MAX_DEPTH_M = 10.0  # end of the colour scale: as far as perception uses depth
 _MAP_PX = (848, 456)  # with the key below: the camera's 848 x 480
 _KEY_PX = 24
 _INK, _PAPER = (60, 60, 60), (235, 235, 235)

@@ -18,10 +18,12 @@ from hal.types import FloatArray
 
 # A flap: this many changes between faster and slower within this time.
 FLAP_REVERSALS, FLAP_S = 3, 2.0
-_STOPPED_MPS, _MOVING_AGAIN_MPS = 0.02, 0.1
-# An obstacle justifies a stop if it is in the way at any time from this long before to this long after it.
+_STOPPED_MPS, _MOVING_AGAIN_MPS = 0.02, 0.1  # as in Nav2's bag metrics (stop_and_go.py)
+# An obstacle justifies a stop if it is in the way at any time from this long before to this long after it:
+# a comfortable stop takes up to 5.5 s, and a robot goes on a second or two after its way is free.
 _BEFORE_STOP_S, _AFTER_STOP_S = 4.0, 2.0
-# A fault justifies a stop for this long after its end.
+_WAY_STEP_S = 0.2  # how often the way is looked at within that time
+# A fault justifies a stop for this long after its end: new scenes have to arrive, and the speed rises late.
 _AFTER_FAULT_S = 1.5
 
 
@@ -144,7 +146,7 @@ def false_stops(stage: Stage, log: DriveLog) -> list[float]:
             continue
         if stage.case.glass and stage.case.scenario.outcome == "blocked":
             continue
-        times = np.arange(max(t0, 0.0), t1, 0.2)
+        times = np.arange(max(t0, 0.0), t1, _WAY_STEP_S)
         s_m = log.s_m[start]
         ahead = any(high >= s_m for intervals in stage.blocked(times) for _, high in intervals)
         if not ahead:

@@ -31,11 +31,12 @@ from vision.scene import CameraCondition, CameraHealth, Scene
 
 # If the robot still stands this long after everything else has come to rest, it will stand for ever.
 GIVE_UP_S = 6.0
-_OFFSET_SIGMA_M = 0.01
-_OFFSET_TIME_CONSTANT_S = 2.0
-_ODOMETRY_SIGMA = 0.003
-_FEEDBACK_TIMEOUT_S = 0.2
-_FROZEN_FRAMES = 2
+# The lateral offset that path tracking leaves (a centimetre or two), and how slowly it changes.
+_OFFSET_SIGMA_M, _OFFSET_TIME_CONSTANT_S = 0.01, 2.0
+_ODOMETRY_SIGMA = 0.003  # relative error of its distance: 6 cm on 20 m
+_FEEDBACK_TIMEOUT_S = 0.2  # the default of chassis.feedback_timeout_ms
+_FROZEN_FRAMES = 2  # as in vision/camera/health.py
+_ROUNDING_S = 1e-9  # of times that are multiples of a period
 
 
 @compiled("int64, float64, float64")
@@ -43,7 +44,7 @@ def _exposure_times(steps: int, dt_s: float, fps: float) -> FloatArray:
     """The times of the control steps, of steps in total, at which a frame is exposed."""
     times, count = np.empty(steps), 0
     for k in range(steps):
-        if count / fps <= k * dt_s + 1e-9:
+        if count / fps <= k * dt_s + _ROUNDING_S:
             times[count] = k * dt_s
             count += 1
     return times[:count]
@@ -63,7 +64,7 @@ class _DelayedCamera:
 
     def due(self, t_s: float) -> bool:
         """Whether the next frame is exposed at this control step."""
-        return self._frame / self._fps <= t_s + 1e-9
+        return self._frame / self._fps <= t_s + _ROUNDING_S
 
     def expose(self, t_s: float, true_pose: PlanarPose, odometry_pose: PlanarPose) -> None:
         """Expose one frame. odometry_pose: the pose by odometry."""
@@ -89,7 +90,7 @@ class _DelayedCamera:
         return replace(last, captured_ns=round(t_s * NS_PER_S), sequence=self._frame, health=health)
 
     def newest_scene(self, t_s: float) -> Scene | None:
-        while self._in_transit and self._in_transit[0][0] <= t_s + 1e-9:
+        while self._in_transit and self._in_transit[0][0] <= t_s + _ROUNDING_S:
             self.known = self._in_transit.popleft()[1]
         return self.known
 

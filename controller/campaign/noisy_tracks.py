@@ -17,9 +17,8 @@ from vision.scene import Obstacle
 
 BoolArray = NDArray[np.bool_]
 
-_BOX_PX = (0.0, 0.0, 1.0, 1.0)
-# Standard deviation of the vertical velocity.
-_VERTICAL_SIGMA_MPS = 0.1
+_BOX_PX = (0.0, 0.0, 1.0, 1.0)  # bbox_px of all of them: there is no image
+_VERTICAL_SIGMA_MPS = 0.1  # of the vertical velocity, which is 0 and which no policy uses
 # A body was seen in the last frame if it was seen within this many frame periods.
 _MAX_UNSEEN_FRAMES = 1.5
 # Columns of a track: id; time of the first and of the last sighting; number of sightings (0: not tracked);

@@ -19,8 +19,9 @@ from controller.decision.situation import Situation
 from hal.types import CameraMount
 from vision.scene import Scene
 
+# Obstacles are looked for this far along the path: more than the paper's greatest S_n, 11.25 m.
 _LOOKAHEAD_M = 14.0
-_STOP_SHORT_M = 0.1
+_STOP_SHORT_M = 0.1  # see detection_distance()
 
 
 class PaperRule:

@@ -7,15 +7,17 @@ import math
 import numpy as np
 
 from controller.campaign.stage import Stage
+from controller.decision.surfaces import floor_points
 from hal.compiled import compiled
 from hal.directions import along_and_left
 from hal.types import FloatArray, PlanarPose
 from sim.planar import PlanarWorld
 
+# A safety scanner as it is usually mounted on a vehicle: low enough for a foot, a ray for each degree.
 SCAN_HEIGHT_M = 0.2
 _FIELD_OF_VIEW_RAD = math.radians(270.0)
 _RAYS = 271
-_RANGE_M = 12.0
+_RANGE_M = 12.0  # farther than any field or zone reaches
 _PERIOD_S = 0.066
 _NOTHING = np.full(_RAYS, np.inf)
 
@@ -46,7 +48,8 @@ class PlanarScanner:
             self._scan_pose = pose
         if self._scan_pose is None or not len(self._points):
             return self._points
-        return _to_body(pose, _to_floor(self._scan_pose, self._points))
+        ahead_m, left_m = self._points.T
+        return in_body(pose, floor_points(self._scan_pose, ahead_m, left_m))
 
     def _scan(self, pose: PlanarPose, t_s: float) -> FloatArray:
         polygons = self._world.snapshot(t_s)[0][self._at_height]
@@ -95,13 +98,8 @@ def _ray_lengths(
     return nearest
 
 
-def _to_floor(pose: PlanarPose, points: FloatArray) -> FloatArray:
-    cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
-    x, y = points[:, 0], points[:, 1]
-    return np.stack((pose.x_m + cos * x - sin * y, pose.y_m + sin * x + cos * y), axis=1)
-
-
-def _to_body(pose: PlanarPose, points: FloatArray) -> FloatArray:
+def in_body(pose: PlanarPose, points: FloatArray) -> FloatArray:
+    """Floor points (P, 2) in the frame of a body at pose."""
     cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
     dx, dy = points[:, 0] - pose.x_m, points[:, 1] - pose.y_m
     return np.stack((dx * cos + dy * sin, dy * cos - dx * sin), axis=1)

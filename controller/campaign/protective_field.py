@@ -17,16 +17,16 @@ from controller.campaign.planar_scan import PlanarScanner
 from controller.campaign.stage import Stage
 from controller.decision.decision import Decision
 from controller.decision.situation import Situation
+from controller.decision.surfaces import floor_points
 from hal.clocks import NS_PER_S
 from hal.types import FloatArray
 
-RESPONSE_S = 0.2
-TOLERANCE_M = 0.1
-GROUND_CLEARANCE_M = 0.15
-RESTART_S = 2.0
-_RESTART_MPS = 0.3
-_SIDE_MARGIN_M = 0.1
-_MIN_POINTS = 2
+RESPONSE_S = 0.2  # t_R: about three scans
+TOLERANCE_M = 0.1  # TZ; Z_R is 0, because the scanner here has no errors
+GROUND_CLEARANCE_M = 0.15  # Z_F; Z_B is 0, because the brakes do not wear
+RESTART_S, _RESTART_MPS = 2.0, 0.3  # see above: the time, and the walking pace of the field for going on
+_SIDE_MARGIN_M = TOLERANCE_M  # beside the robot, which keeps its lane: the tolerance alone
+_MIN_POINTS = 2  # a single point is no object
 
 
 class ProtectiveField:
@@ -69,9 +69,8 @@ class ProtectiveField:
         near = (points[:, 0] > -body.rear_m) & (np.hypot(points[:, 0], points[:, 1]) < reach + 1.0)
         if not near.any():
             return False
-        cos, sin = np.cos(pose.heading_rad), np.sin(pose.heading_rad)
-        x, y = points[near, 0], points[near, 1]
-        floor = np.stack((pose.x_m + cos * x - sin * y, pose.y_m + sin * x + cos * y), axis=1)
+        ahead_m, left_m = points[near].T
+        floor = floor_points(pose, ahead_m, left_m)
         s, d = at.path.project_points(floor, s_m - 1.0, s_m + reach + 1.0)
         ahead = s - s_m
         inside = (ahead > 0.0) & (ahead < reach) & (np.abs(d) < 0.5 * body.width_m + _SIDE_MARGIN_M)

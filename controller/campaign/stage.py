@@ -18,7 +18,8 @@ from sim.families import Case
 from sim.planar import PlanarWorld
 from sim.polygons import overlap
 
-_TABLE_STEP_M = 0.02
+_TABLE_STEP_M = 0.02  # of the poses along the path; for the accuracy of Stage.pose()
+# Steps along the path in which the robot is tried: it is much longer, so nothing slips through between them.
 _SWEEP_STEP_M = 0.05
 
 

@@ -27,6 +27,7 @@ from controller.errors import UserError
 from hal.types import FloatArray
 
 STOPPED_MPS, DRIVING_MPS, MIN_SAMPLES = 0.02, 0.10, 3
+# Hysteresis: the way counts as free again from this much more on than a stop needs.
 _CLEAR_MARGIN_M = 0.3
 _COLUMNS = ("t_s", "s_m", "v_mps", "action", "free_m")
 

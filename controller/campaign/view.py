@@ -24,9 +24,9 @@ BoolArray = NDArray[np.bool_]
 # x_m and y_m of the camera on the floor, and the cosine and sine of where it looks.
 Eye = Annotated[tuple[float, float, float, float], "UniTuple(float64, 4)"]
 
-BANDS = 80
-_NEAR_M = 0.1
-_TOLERANCE_M = 1e-6
+BANDS = 80  # as many as the scan of perception has at most
+_NEAR_M = 0.1  # nothing nearer than this ahead of the camera is hit, so that no distance is 0
+_TOLERANCE_M = 1e-6  # of what is as far away as what occludes it: itself
 
 
 @record(frozen=True, slots=True, eq=False)

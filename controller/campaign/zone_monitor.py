@@ -9,23 +9,23 @@ Emergency braking is allowed.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from config.robot import Robot
 from controller.campaign.baseline_policy import decision, free_speed
-from controller.campaign.planar_scan import PlanarScanner
+from controller.campaign.planar_scan import PlanarScanner, in_body
 from controller.campaign.stage import Stage
 from controller.decision.decision import Decision
 from controller.decision.situation import Situation
 from hal.clocks import NS_PER_S
-from hal.types import FloatArray
+from hal.geometry import advance_pose
+from hal.types import FloatArray, PlanarPose
 
 _STOP_MARGIN_M, _SLOW_MARGIN_M = 0.08, 0.18
 _SLOWDOWN_RATIO = 0.3
 _ZONE_POINTS, _APPROACH_POINTS = 4, 6
 _TIME_BEFORE_COLLISION_S, _STEP_S = 2.0, 0.1
+_HERE = PlanarPose(0.0, 0.0, 0.0)
 
 
 class ZoneMonitor:
@@ -68,12 +68,8 @@ class ZoneMonitor:
         if self._count(points, -body.rear_m, body.front_m, half_width_m) >= _APPROACH_POINTS:
             return 0.0
         for k in range(round(_TIME_BEFORE_COLLISION_S / _STEP_S)):
-            turn = curvature_1pm * v_mps * (k + 1) * _STEP_S
-            distance = v_mps * (k + 1) * _STEP_S * float(np.sinc(0.5 * turn / math.pi))
-            x, y = distance * math.cos(0.5 * turn), distance * math.sin(0.5 * turn)
-            cos, sin = math.cos(turn), math.sin(turn)
-            dx, dy = points[:, 0] - x, points[:, 1] - y
-            relative = np.stack((dx * cos + dy * sin, dy * cos - dx * sin), axis=1)
+            then = advance_pose(_HERE, v_mps, curvature_1pm * v_mps, (k + 1) * _STEP_S)
+            relative = in_body(then, points)
             if self._count(relative, -body.rear_m, body.front_m, half_width_m) >= _APPROACH_POINTS:
                 # The tested pose is one step later than this time, as in Nav2.
                 return k * _STEP_S

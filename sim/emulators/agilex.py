@@ -32,8 +32,8 @@ from sim.plant import TrackedPlant
 
 _STANDBY, _CAN, _SERIAL, _REMOTE = 0, 1, 2, 3
 _NORMAL, _ESTOP, _EXCEPTION = 0, 1, 2
-_WHEEL_RADIUS_M = 0.1
-_PULSES_PER_M = 20_000
+# For the motors' own reports, which the driver does not use. Real bases differ.
+_WHEEL_RADIUS_M, _PULSES_PER_M = 0.1, 20_000
 
 
 @dataclass(slots=True)

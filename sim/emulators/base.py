@@ -11,7 +11,7 @@ from hal.device_wrapper import DeviceWrapper
 from hal.errors import LinkLost
 from sim.plant import TrackedPlant
 
-_STEP_NS = NS_PER_MS
+_STEP_NS = NS_PER_MS  # in which the controller's own ramp is followed
 
 
 class ChassisEmulator(DeviceWrapper, ABC):

@@ -15,11 +15,12 @@ from hal.clocks import NS_PER_MS
 from sim.emulators.base import SerialEmulator
 from sim.plant import TrackedPlant
 
+# Written here once more: taken from hal/chassis/kobuki_packets.py they would agree with any mistake there.
 _STREAM_NS = 20 * NS_PER_MS
 _HEADER = b"\xaa\x55"
 _HALF_BASE_MM = 115.0
-_TICKS_PER_M = 1.0 / (0.002436916871363930187454 * 0.035)
-_CENTRE = 0x2
+_TICKS_PER_M = 1.0 / (0.002436916871363930187454 * 0.035)  # radians per tick, radius of a wheel in m
+_CENTRE = 0x2  # bit of the bumper's middle
 
 
 class KobukiEmulator(SerialEmulator):

@@ -16,7 +16,7 @@ from hal.clocks import NS_PER_MS
 from sim.emulators.base import MotorController
 from sim.plant import TrackedPlant
 
-_GAP_NS = 10 * NS_PER_MS
+_GAP_NS = 10 * NS_PER_MS  # after so much silence inside a packet, the controller drops it
 _ACK = b"\xff"
 
 # Bytes of data in each write. All other known commands are reads, which carry none.
@@ -25,7 +25,7 @@ _WRITES: Mapping[int, int] = MappingProxyType(
 )
 _READS = frozenset({15, 16, 17, 18, 19, 24, 25, 30, 31, 49, 78, 79, 82, 83, 90, 108})
 
-_ESTOP_BIT = {2: 0x4, 4: 0x1}
+_ESTOP_BIT = {2: 0x4, 4: 0x1}  # by the bytes of the status: old and new firmware
 
 
 class RoboclawEmulator(MotorController):

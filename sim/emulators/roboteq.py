@@ -14,8 +14,8 @@ from hal.clocks import NS_PER_MS
 from sim.emulators.base import MotorController, as_int32
 from sim.plant import TrackedPlant
 
-_ESTOP_FLAG = 0x10
-_DEFAULT_WATCHDOG_MS = 1000
+_ESTOP_FLAG = 0x10  # of the fault flags, ?FF
+_DEFAULT_WATCHDOG_MS = 1000  # after each start
 _ACCEPTED, _REFUSED = "+", "-"
 
 

@@ -21,7 +21,8 @@ from sim.families.layout import (
     walk,
 )
 
-_START_OFFSET_M = 3.6
+_START_OFFSET_M = 3.6  # beside the path, where whoever crosses starts and ends: behind the racks
+_GAP_MARGIN_M = 1.3  # room beside its way in the gap between the racks; another robot is about 1 m long
 
 
 def crossing_left(random: Random) -> Scenario:
@@ -57,8 +58,7 @@ def _crosser(
         # It would have to start before time zero, so it begins part of the way in.
         skipped = min(-start_s / approach_s, 0.45)
         start = (x_m - shift * (1.0 - skipped), side * _START_OFFSET_M * (1.0 - skipped))
-    margin = 1.3
-    gap = (x_m - abs(shift) - margin, x_m + abs(shift) + margin)
+    gap = (x_m - abs(shift) - _GAP_MARGIN_M, x_m + abs(shift) + _GAP_MARGIN_M)
     if is_robot:
         return robot(random, name, start, drive(start_s, go(*end, speed))), gap
     return person(random, name, start, walk(start_s, go(*end, speed))), gap

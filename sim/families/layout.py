@@ -26,13 +26,12 @@ from config.scenario import (
 
 Random = np.random.Generator
 
-FRONT_M = 0.51
-HALF_WIDTH_M = 0.39
+FRONT_M, HALF_WIDTH_M = 0.51, 0.39  # of the robot, from its turning centre
 # Upper bounds of the robot's speed and acceleration, without delay and jerk limit.
 _TOP_MPS, _ACCEL_MPS2 = 1.5, 0.3
-RACK_DEPTH_M = 1.1
+RACK_DEPTH_M = 1.1  # a pallet of 1.2 m is stored with some overhang
 BLEND_M = 0.8  # length of the blend at either end of a bend
-_BAY_M = 2.7
+_BAY_M = 2.7  # a bay of a pallet rack: three pallets of 0.8 m side by side
 
 
 def max_travel_m(t_s: float) -> float:

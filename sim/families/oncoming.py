@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from config.scenario import MotionPlan, Scenario, Step
 from sim.families.layout import (
+    HALF_WIDTH_M,
     Random,
     drive,
     go,
@@ -17,6 +18,7 @@ from sim.families.layout import (
     walk,
 )
 
+# Beside the path, where people and robots go past: 0.76 m from the robot's side.
 _LANE_OFFSET_M = 1.15
 
 
@@ -120,7 +122,7 @@ def grazing(random: Random) -> Scenario:
     side = random_side(random)
     speed = float(random.uniform(0.5, 1.4))
     # Half the robot's width, half of a walking person's (0.33 m at most), and the gap.
-    y = side * (0.39 + 0.33 + float(random.uniform(0.03, 0.35)))
+    y = side * (HALF_WIDTH_M + 0.33 + float(random.uniform(0.03, 0.35)))
     motion = walk(float(random.uniform(0.0, 3.0)), go(-5.0, y, speed))
     obstacle = person(random, "person", (length + 1.5, y), motion)
     return scenario("grazing", length, (*racks(random, length), obstacle))

@@ -18,7 +18,7 @@ from sim.families.layout import (
     walk,
 )
 
-_LANE_OFFSET_M = 1.2
+_LANE_OFFSET_M = 1.2  # beside the path, where they go: 0.8 m from the robot's side
 
 
 def cut_in(random: Random) -> Scenario:

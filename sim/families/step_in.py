@@ -10,7 +10,7 @@ from config.faults import Faults
 from sim.families.layout import earliest_arrival_s, go, person, racks, random_side, scenario, wait, walk
 from sim.families.registry import USUAL_SLIP, Case
 
-_START_OFFSET_M = 3.4
+_START_OFFSET_M = 3.4  # beside the path, where the person starts and ends: behind the racks
 _LENGTH_M = 16.0
 
 

@@ -11,7 +11,7 @@ from hal.types import FloatArray, Pose
 from sim.models.mesh import Faces, axis_rotation, join, prism
 from sim.motion import MotionState
 
-_SIDES = 8
+_SIDES = 8  # of the prisms that stand for trunk and limbs
 # Shares of the body height, after common anthropometric tables.
 _HIP, _KNEE, _ANKLE, _SHOULDER, _CHIN, _ELBOW = 0.52, 0.27, 0.03, 0.81, 0.86, 0.63
 _STEP_M = 0.42  # length of a step as a share of the height
@@ -19,6 +19,7 @@ _STEP_M = 0.42  # length of a step as a share of the height
 _SOLE: FloatArray = np.array([[-0.035, 0.0, -_ANKLE], [0.104, 0.0, -_ANKLE]])
 # A foot pitches by this share of its shank's angle.
 _FOOT_PITCH_RATIO = 0.4
+# Greatest angles of a walker's arms and knees: 22 and 49 degrees.
 _ARM_SWING_RAD, _KNEE_BEND_RAD = 0.38, 0.85
 
 

@@ -10,9 +10,8 @@ import numpy as np
 from config.scenario import Shelf
 from sim.models.mesh import Faces, box, join, quad
 
-_POST_M = 0.10
-_BEAM_M = 0.11
-_RECESS_M = 0.16
+# Side of a post, height of a beam, and how far the goods stand behind the front: as in usual pallet racks.
+_POST_M, _BEAM_M, _RECESS_M = 0.10, 0.11, 0.16
 
 
 def build_rack(spec: Shelf, generator: np.random.Generator) -> Faces:

@@ -12,7 +12,7 @@ from sim.models.mesh import Faces, axis_rotation, box, join, prism
 from sim.motion import MotionState
 
 SENSOR_HEIGHT_M = 0.08  # height of the lidar above the hull
-_WHEEL_SIDES = 12
+_WHEEL_SIDES = 12  # of the prism that stands for a wheel: round at the few pixels that it covers
 
 
 def build_robot(

@@ -13,8 +13,8 @@ from sim.rendering.raster import Drawn, Float32Image, LabelImage
 
 # Bits that are set for a difference of 16 or more grey levels in one of three channels.
 _VISIBLE_STEP = np.uint32(0x00F0F0F0)
-_ON_EDGE = np.float32(1e-9)
-_NOT_APPROACHED = np.float32(1e-12)
+# Lower bounds of the distance to an edge, and of the slope towards it; see _blend().
+_ON_EDGE, _NOT_APPROACHED = np.float32(1e-9), np.float32(1e-12)
 
 
 def smooth_edges(

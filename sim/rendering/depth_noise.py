@@ -23,13 +23,13 @@ SIGMA_PER_M: dict[str, float] = {"realsense": 0.0075, "paper": 0.0005, "none": 0
 
 ScalarT = TypeVar("ScalarT", bound=np.generic)
 
-_BASELINE_M = 0.050
+_BASELINE_M = 0.050  # between the two imagers of a D435i (its data sheet)
 # Size of the noise blobs along u and v, as a broad and a fine part. Measured on a real RealSense (plane
 # residuals at 0.8 to 1.4 m: the correlation falls to 0.9 after one pixel, 0.65 and 0.35 after five).
 _BLOB_PX = (3.5, 2.8)
 _FINE_PX = (0.6, 0.6)
 _FINE_SHARE = 0.08  # of the variance
-_HOLE_BLOB_PX = (2.5, 2.0)
+_HOLE_BLOB_PX = (2.5, 2.0)  # holes come in blobs, somewhat finer than those of the noise
 _MARGIN_PX = 96  # the noise field is larger than the image by this much, so that it can be shifted
 _TOLERATED_SHIFT_PX = 1.0  # smaller steps of disparity are slanted surfaces, not edges
 BAND_ROWS = 96  # rows processed at a time: their data stay in the processor's cache

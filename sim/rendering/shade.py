@@ -19,7 +19,7 @@ from sim.world import Geometry
 
 # Maximum ratio of distances within a part of a face that uses one step of the pyramid.
 _DEPTH_RATIO = 1.4
-_FARTHEST_M = 60.0
+_FARTHEST_M = 60.0  # parts farther away than this use the same step: no hall is larger
 
 Rectangle = tuple[int, int, int, int]  # first column and row, last column and row + 1
 

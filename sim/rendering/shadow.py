@@ -18,7 +18,7 @@ _MARGIN_M = 0.6  # half width of the penumbra of a large lamp: to either side of
 _MAX_DARKENING = 0.6  # share of the light that is lost right below a body
 _MAX_UNDERSIDE_M = 0.5  # bodies that hang higher than this cast no distinct shadow
 _MAX_DISTANCE_M = 12.0  # shadows further away than this are left out
-_SIDE_PX = 64
+_SIDE_PX = 64  # of the shadow's image, which has no sharp edges
 _RIM = 0.3  # share of the shadow's image that lies outside the footprint, on each side
 
 
