@@ -84,7 +84,7 @@ class RealtimeRig:
             for refused in become_realtime(self.runner.priority):
                 console.event(f"not permitted, running without: {refused}")
             moments = run_realtime(
-                self.runner, self.clock, self.simulation, link, loop, service, stop, self.punctuality
+                self.runner, self.clock, self.simulation, link, loop, stop, self.punctuality
             )
             try:
                 yield self._told(moments, loop.lifecycle, link, service, console, on_ready)
@@ -113,12 +113,13 @@ class RealtimeRig:
         console: Console,
         on_ready: Callable[[ServiceManager], None],
     ) -> Iterator[RealtimeMoment]:
-        """Passes the moments on; tells the service manager when the drive is ready and when it is stopping.
+        """Passes the moments on; tells the service manager that the drive goes on, is ready or is stopping.
 
         Raises DeviceRefused at the end if perception could not start: without a scene nothing has moved.
         """
         told_ready = False
         for moment in moments:
+            service.feed_watchdog(moment.control.now_ns)
             if link.newest is not None and not told_ready:
                 told_ready = True
                 on_ready(service)

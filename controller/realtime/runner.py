@@ -17,7 +17,7 @@ from controller.control import ControlStep, Drive
 from controller.lockstep import Outside
 from controller.realtime.messages import SceneMessage, StepMessage
 from controller.realtime.perception_link import PerceptionLink
-from controller.realtime.service import ServiceManager, StopRequest
+from controller.realtime.service import StopRequest
 from controller.record.tally import MAX_SAMPLES
 from hal.api import Clock
 from hal.clocks import NS_PER_S
@@ -62,7 +62,6 @@ def run_realtime(
     outside: SimulatedWorld | None,
     perception: PerceptionLink,
     loop: Drive,
-    service: ServiceManager,
     stop: StopRequest,
     punctuality: Punctuality,
 ) -> Iterator[RealtimeMoment]:
@@ -91,7 +90,6 @@ def run_realtime(
         if step.chassis.sent is not None:
             punctuality.commanded_ns.append(clock.now_ns())
         perception.send(StepMessage(step, None if outside is None else outside.body_pose))
-        service.feed_watchdog(now_ns)
         yield RealtimeMoment(tuple(arrived), step)
         deadline_ns += period_ns
         missed = (clock.now_ns() - deadline_ns + period_ns // 2) // period_ns

@@ -99,8 +99,9 @@ def _watch(
             perception_beside(config, start_ns, recording) as link,
             console.beside_a_drive(),
         ):
-            moments = run_realtime(endless, clock, simulation, link, loop, service, stop, Punctuality())
+            moments = run_realtime(endless, clock, simulation, link, loop, stop, Punctuality())
             for moment in moments:
+                service.feed_watchdog(moment.control.now_ns)
                 for message in moment.arrived:
                     if not result.frames.processed:
                         service.ready("watching")

@@ -8,7 +8,7 @@ from controller.realtime.channel import Channel, channel_sockets
 from controller.realtime.messages import CutOff, Farewell, SceneMessage, StepMessage
 from controller.realtime.perception_link import PerceptionLink
 from controller.realtime.runner import Punctuality, run_realtime
-from controller.realtime.service import ServiceManager, StopRequest
+from controller.realtime.service import StopRequest
 from hal.types import PlanarPose
 from tests.support.runner_doubles import RecordingDrive, control_step
 from tests.support.scenes import scene
@@ -47,7 +47,7 @@ def steps_of(
 ) -> Punctuality:
     punctuality = Punctuality()
     stop = StopRequest()
-    for _ in run_realtime(runner, clock, None, link, loop, ServiceManager({}, 1), stop, punctuality):
+    for _ in run_realtime(runner, clock, None, link, loop, stop, punctuality):
         pass
     return punctuality
 
@@ -121,9 +121,7 @@ def test_a_stop_signal_becomes_a_stop_request(ends: Ends) -> None:
     link, _there = ends
     loop, stop = RecordingDrive(steps=100), StopRequest()
     stop.reason = "SIGTERM"
-    moments = run_realtime(
-        RUNNER, LateClock({}), None, link, loop, ServiceManager({}, 1), stop, Punctuality()
-    )
+    moments = run_realtime(RUNNER, LateClock({}), None, link, loop, stop, Punctuality())
     assert len(list(moments)) == 1
     assert loop.stop_reasons == ["SIGTERM received"]
     assert loop.endings == [Outcome.STOPPED]
@@ -165,7 +163,6 @@ def test_perception_hears_where_the_world_has_the_robot(ends: Ends) -> None:
         Merry(),
         link,
         RecordingDrive(steps=3),
-        ServiceManager({}, 1),
         StopRequest(),
         Punctuality(),
     )
