@@ -71,15 +71,7 @@ def find_conflicts(
     A body has left only once it is clear of the margin despite the whole spread of its velocity: leaving must
     be certain before the robot relies on it.
     """
-    conflicts = _conflicts(
-        placed.clearance_m,
-        placed.block_from_s_m,
-        placed.block_to_s_m,
-        times_s,
-        sigma_side_mps,
-        margin_m,
-        rows,
-    )
+    conflicts = _conflicts(placed, times_s, sigma_side_mps, margin_m, rows)
     return [
         Conflict(row, *times_and_places)
         for row, times_and_places in zip(rows.tolist(), conflicts.tolist(), strict=True)
@@ -102,33 +94,20 @@ class Choice:
 def choices(
     conflict: Conflict,
     ramps: SpeedRamps,
-    speeds_mps: FloatArray,
     s_m: float,
     margin_m: float,
     leave_s: float,
     enter_s: float,
 ) -> Choice:
-    """Both bounds, for the robot at s_m whose ramps lead to speeds_mps (N,), which grow from 0 on.
+    """Both bounds, for the robot at s_m. The speeds to which its ramps lead grow from 0 on.
 
     margin_m: distance kept to the stretch that is blocked. leave_s: least time from the obstacle's leaving
     until the robot arrives. enter_s: least time from the robot's having passed until the obstacle enters.
     """
     times = np.array([conflict.in_s, max(conflict.in_s - enter_s, 0.0), conflict.out_s + leave_s])
-    leaves = math.isfinite(conflict.out_s)
-    if not leaves:
+    if math.isinf(conflict.out_s):
         times[2] = times[0]
-    return Choice(
-        *_bounds(
-            ramps.distance(times[None, :]),
-            speeds_mps,
-            s_m,
-            conflict.lo_in_m,
-            conflict.lo_out_m,
-            conflict.hi_in_m,
-            margin_m,
-            leaves,
-        )
-    )
+    return Choice(*_bounds(conflict, ramps.distance(times[None, :]), ramps.targets_mps, s_m, margin_m))
 
 
 @inlined
@@ -196,11 +175,9 @@ def _likely_enters(
     return found
 
 
-@compiled("float64[:, :], float64[:, :], float64[:, :], float64[:], float64[:], float64[:], int64[:]")
+@compiled(Placed, "float64[:], float64[:], float64[:], int64[:]")
 def _conflicts(
-    clearance_m: FloatArray,
-    block_from_s_m: FloatArray,
-    block_to_s_m: FloatArray,
+    placed: Placed,
     times_s: FloatArray,
     sigma_mps: FloatArray,
     margin_m: FloatArray,
@@ -213,35 +190,30 @@ def _conflicts(
     found = np.empty((len(rows), 5))
     for i in range(len(rows)):
         k = rows[i]
-        in_s = _enters_s(clearance_m[k], margin_m[k], times_s, sigma_mps[k])
-        out_s = _leaves_s(clearance_m[k], margin_m[k], times_s, sigma_mps[k], in_s)
+        in_s = _enters_s(placed.clearance_m[k], margin_m[k], times_s, sigma_mps[k])
+        out_s = _leaves_s(placed.clearance_m[k], margin_m[k], times_s, sigma_mps[k], in_s)
         found[i, 0], found[i, 1] = in_s, out_s
-        found[i, 2] = _interpolated(in_s, times_s, block_from_s_m[k])
-        found[i, 3] = _interpolated(out_s, times_s, block_from_s_m[k])
-        found[i, 4] = _interpolated(in_s, times_s, block_to_s_m[k])
+        found[i, 2] = _interpolated(in_s, times_s, placed.block_from_s_m[k])
+        found[i, 3] = _interpolated(out_s, times_s, placed.block_from_s_m[k])
+        found[i, 4] = _interpolated(in_s, times_s, placed.block_to_s_m[k])
     return found
 
 
-@compiled("float64[:, :], float64[:], float64, float64, float64, float64, float64, boolean")
+@compiled(Conflict, "float64[:, :], float64[:], float64, float64")
 def _bounds(
-    distance_m: FloatArray,
-    speeds_mps: FloatArray,
-    s_m: float,
-    lo_in_m: float,
-    lo_out_m: float,
-    hi_in_m: float,
-    margin_m: float,
-    leaves: bool,
+    conflict: Conflict, distance_m: FloatArray, speeds_mps: FloatArray, s_m: float, margin_m: float
 ) -> tuple[float, float]:
-    """The fields of Choice, for a conflict with a body that leaves, or does not.
+    """The fields of Choice.
 
-    distance_m (N, 3): how far the robot at s_m comes with each speed until the body enters, until the robot
-    should have passed, and until the body has left.
+    distance_m (N, 3): how far the robot at s_m comes with each of speeds_mps (N,) until the body enters,
+    until the robot should have passed, and until the body has left.
     """
+    leaves = math.isfinite(conflict.out_s)
     yield_mps = math.inf if leaves else 0.0
     before_m = 0.0
     for k in range(len(speeds_mps) if leaves else 0):
-        room_m = min(lo_in_m - (distance_m[k, 0] + s_m), lo_out_m - (distance_m[k, 2] + s_m)) - margin_m
+        before_it_m = conflict.lo_in_m - (distance_m[k, 0] + s_m)
+        room_m = min(before_it_m, conflict.lo_out_m - (distance_m[k, 2] + s_m)) - margin_m
         if room_m < 0.0:
             # Interpolate the speed at which the room becomes 0; if even standing is too near, it is 0.
             yield_mps = 0.0
@@ -251,6 +223,6 @@ def _bounds(
             break
         before_m = room_m
     for k in range(len(speeds_mps)):
-        if distance_m[k, 1] + s_m > hi_in_m:
+        if distance_m[k, 1] + s_m > conflict.hi_in_m:
             return yield_mps, speeds_mps[k]
     return yield_mps, math.inf

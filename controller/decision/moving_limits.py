@@ -29,7 +29,7 @@ from controller.decision.limits import (
     stop_before,
 )
 from controller.decision.watched import Watched
-from controller.profile import SpeedRamps, comfortable
+from controller.profile import SpeedRamps, ramps_from
 from hal.types import FloatArray
 
 _SPEEDS = 31  # how many speeds are tried
@@ -81,7 +81,7 @@ class MovingLimits:
         conflicts = self._conflicts(watched, rows, s_m, -math.inf if standing else s_m - ALONGSIDE_M, now_s)
         if not conflicts:
             return [], base_mps
-        ramps = comfortable(self._limits, motion, self._speeds)
+        ramps = ramps_from(motion, self._speeds, self._comfort)
         offers = []
         for one in conflicts:
             stays = self._when_it_stays(one, watched, s_m, motion)
@@ -171,7 +171,7 @@ class MovingLimits:
         margins, track_id = self._config.margins, int(bodies.ids[conflict.row])
         first = track_id in self._robot_passes_first
         enter_s = margins.crossing_s * (0.5 if first else 1.0) + (0.0 if first else _SWITCH_MARGIN_S)
-        choice = choices(conflict, ramps, self._speeds, s_m, margins.least_m, margins.crossing_s, enter_s)
+        choice = choices(conflict, ramps, s_m, margins.least_m, margins.crossing_s, enter_s)
         if conflict.in_s <= 0.0 or conflict.hi_in_m <= s_m:
             choice = Choice(choice.yield_mps, math.inf)
         worth_mps = _MIN_ARRIVAL_MPS if conflict.out_s <= _MAX_FORESEEN_LEAVE_S else math.inf

@@ -137,15 +137,7 @@ class StandingLimits:
         rows = near.nonzero()[0]
         if len(rows):
             stop_m = self._stands_off_m(known, bodies, placed)
-            fields = _columns(
-                rows,
-                placed.block_from_s_m,
-                placed.block_to_s_m,
-                clearance_m,
-                bodies.age_s,
-                bodies.unseen_s,
-                stop_m,
-            ).tolist()
+            fields = _columns(rows, bodies, placed, clearance_m, stop_m).tolist()
             track_ids = bodies.ids[rows].tolist()
             self._near = [_Near(one, *others) for one, others in zip(track_ids, fields, strict=True)]
         for gone in self._clear_since_s.keys() - {near.track_id for near in self._near}:
@@ -220,22 +212,16 @@ def _stands_within(
     return within
 
 
-@compiled("int64[:], float64[:, :], float64[:, :], float64[:], float64[:], float64[:], float64[:]")
+@compiled("int64[:]", Bodies, Placed, "float64[:], float64[:]")
 def _columns(
-    rows: NDArray[np.intp],
-    block_from_s_m: FloatArray,
-    block_to_s_m: FloatArray,
-    clearance_m: FloatArray,
-    age_s: FloatArray,
-    unseen_s: FloatArray,
-    stop_m: FloatArray,
+    rows: NDArray[np.intp], bodies: Bodies, placed: Placed, clearance_m: FloatArray, stop_m: FloatArray
 ) -> FloatArray:
     """(R, 6) the fields of _Near except track_id, for the bodies rows (R,)."""
     near = np.empty((len(rows), 6))
     for i in range(len(rows)):
         k = rows[i]
-        near[i, :2] = block_from_s_m[k, 0], block_to_s_m[k, 0]
-        near[i, 2:] = clearance_m[k], age_s[k], unseen_s[k], stop_m[k]
+        near[i, :2] = placed.block_from_s_m[k, 0], placed.block_to_s_m[k, 0]
+        near[i, 2:] = clearance_m[k], bodies.age_s[k], bodies.unseen_s[k], stop_m[k]
     return near
 
 

@@ -36,7 +36,7 @@ from controller.decision.reachability import (
     stops,
 )
 from controller.decision.watched import Watched
-from controller.profile import SpeedRamps, comfortable
+from controller.profile import SpeedRamps, ramps_from
 from hal.types import FloatArray
 
 # Times that are looked at: every 0.1 s up to 2 s, where stops from low speeds end, then every 0.2 s.
@@ -60,8 +60,9 @@ class WorstCase:
 
     def __init__(self, config: DecisionConfig, limits: Limits) -> None:
         self._config, self._limits = config, limits
+        self._comfort, self._emergency = braking.comfort(limits), braking.emergency(limits)
         waits_s = max(config.chassis_delay_s + config.prediction.confirm_s + _PERIOD_S, _MIN_WAIT_S)
-        stop = braking.stop(limits.max_speed_mps, 0.0, braking.emergency(limits))
+        stop = braking.stop(limits.max_speed_mps, 0.0, self._emergency)
         longest_s = stop.time_s + waits_s
         self.times_s: FloatArray = np.concatenate(
             (
@@ -97,7 +98,7 @@ class WorstCase:
         speed = self._speed(reached, young, watched.could_enter, s_m)
         if speed >= min(chosen_mps, self._limits.max_speed_mps) and speed >= motion.v_mps:
             return None
-        go = comfortable(self._limits, motion, np.array([chosen_mps]))
+        go = ramps_from(motion, np.array([chosen_mps]), self._comfort)
         if passes_clear(go, s_m, self.times_s, reached):
             return None
         urgent = False
@@ -172,9 +173,8 @@ class WorstCase:
             speeds,
             a_mps2,
             np.zeros(len(speeds)),
+            self._emergency,
             accel_mps2=self._limits.max_accel_mps2,
-            decel_mps2=self._limits.emergency_decel_mps2,
-            jerk_mps3=self._limits.emergency_jerk_mps3,
             latency_s=latency_s,
         )
         return stops(ramps, self.times_s)

@@ -24,9 +24,8 @@ LIMITS = BrakeLimits(0.3, 0.6)
 
 
 def ramps(v: float, a: float, targets: list[float], latency_s: float = 0.0) -> SpeedRamps:
-    return SpeedRamps(
-        v, a, np.array(targets), accel_mps2=0.3, decel_mps2=0.7, jerk_mps3=0.6, latency_s=latency_s
-    )
+    limits = BrakeLimits(0.7, 0.6)
+    return SpeedRamps(v, a, np.array(targets), limits, accel_mps2=0.3, latency_s=latency_s)
 
 
 @given(st.floats(0.0, 1.5), st.floats(-0.7, 0.3), st.floats(0.0, 1.5), st.floats(0.0, 12.0))
@@ -77,7 +76,7 @@ def test_holds_the_speed_for_the_latency() -> None:
 
 
 def test_each_ramp_may_start_from_its_own_speed() -> None:
-    both = SpeedRamps(np.array([0.5, 1.5]), 0.0, np.zeros(2), accel_mps2=0.3, decel_mps2=0.3, jerk_mps3=0.6)
+    both = SpeedRamps(np.array([0.5, 1.5]), 0.0, np.zeros(2), LIMITS)
     stops = [braking.stop(v, 0.0, LIMITS) for v in (0.5, 1.5)]
     assert both.duration_s.tolist() == pytest.approx([stop.time_s for stop in stops])
     at_end = both.distance(both.duration_s[:, None])[:, 0]

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from config.robot import Body
+from controller.braking import BrakeLimits
 from controller.decision.bodies import Bodies
 from controller.decision.corridor import Corridor, place
 from controller.decision.crossing import Choice, Conflict, choices, find_conflicts, likely_enters
@@ -17,6 +18,7 @@ from tests.support.floor_bodies import box, line_path
 TIMES = np.arange(0.0, 8.1, 0.2)
 CORRIDOR = Corridor(line_path(), Body(width_m=0.8, length_m=1.0, rear_m=0.5))
 SPEEDS = np.linspace(0.0, 1.5, 31)
+COMFORT = BrakeLimits(0.3, 0.6)
 
 
 def conflicts(body: Bodies, sigma_mps: float = 0.0, margin_m: float = 0.1) -> list[Conflict]:
@@ -69,22 +71,20 @@ def test_leaving_must_be_certain() -> None:
 
 
 def ramps(v_mps: float) -> SpeedRamps:
-    return SpeedRamps(v_mps, 0.0, SPEEDS, accel_mps2=0.3, decel_mps2=0.3, jerk_mps3=0.6)
+    return SpeedRamps(v_mps, 0.0, SPEEDS, COMFORT)
 
 
 CROSSING = Conflict(0, 4.0, 6.0, 5.0, 5.0, 6.0)
 
 
 def choose(conflict: Conflict, v_mps: float, enter_s: float = 0.0, leave_s: float = 0.0) -> Choice:
-    return choices(conflict, ramps(v_mps), SPEEDS, 0.0, 0.0, leave_s, enter_s)
+    return choices(conflict, ramps(v_mps), 0.0, 0.0, leave_s, enter_s)
 
 
 def test_slow_a_little_and_come_when_it_has_left() -> None:
     choice = choose(CROSSING, 1.0)
     assert 0.5 < choice.yield_mps < 1.0
-    at_exit = SpeedRamps(
-        1.0, 0.0, np.array([choice.yield_mps]), accel_mps2=0.3, decel_mps2=0.3, jerk_mps3=0.6
-    ).distance(np.array([[6.0]]))
+    at_exit = SpeedRamps(1.0, 0.0, np.array([choice.yield_mps]), COMFORT).distance(np.array([[6.0]]))
     # Between two of the 31 speeds it is interpolated.
     assert at_exit[0, 0] == pytest.approx(5.0, abs=0.02)
 

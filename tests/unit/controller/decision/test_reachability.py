@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from config.robot import Body
+from controller.braking import BrakeLimits
 from controller.decision.bodies import Bodies
 from controller.decision.corridor import Corridor, place
 from controller.decision.manoeuvres import Manoeuvres
@@ -22,6 +23,7 @@ from tests.support.floor_bodies import box, line_path
 
 TIMES = np.arange(0.0, 4.01, 0.1)
 CORRIDOR = Corridor(line_path(), Body(width_m=0.8, length_m=1.0, rear_m=0.5))
+HARD = BrakeLimits(0.7, 2.0)
 
 
 def manoeuvres(
@@ -50,15 +52,7 @@ def reached(body: Bodies, sigma_mps: float = 0.0, manoeuvre_mps2: float = 0.0, s
 
 
 def stop_from(v_mps: float, latency_s: float = 0.0) -> SpeedRamps:
-    return SpeedRamps(
-        np.array([v_mps]),
-        0.0,
-        np.zeros(1),
-        accel_mps2=0.3,
-        decel_mps2=0.7,
-        jerk_mps3=2.0,
-        latency_s=latency_s,
-    )
+    return SpeedRamps(v_mps, 0.0, np.zeros(1), HARD, latency_s=latency_s)
 
 
 def stops_in_time(v_mps: float, body: Reach, latency_s: float = 0.0, s_m: float = 0.0) -> bool:
@@ -120,7 +114,7 @@ def test_a_stop_is_in_time_where_it_ends_before_what_is_blocked(latency_s: float
 def test_the_stops_that_are_in_time_are_counted_from_the_slowest_on() -> None:
     """2 m before something that stands: v^2 / 1.4 + 0.175 v is 1.71 m from 1.43 m/s, 2.2 m from 1.64 m/s."""
     speeds = np.array([0.0, 1.0, 1.43, 1.64, 2.0])
-    ramps = SpeedRamps(speeds, 0.0, np.zeros(5), accel_mps2=0.3, decel_mps2=0.7, jerk_mps3=2.0)
+    ramps = SpeedRamps(speeds, 0.0, np.zeros(5), HARD)
     stopping, standing = stops(ramps, TIMES), reached(box(5.0, 0.0))
     assert count_safe_stops(stopping, 2.1, standing, np.array([True])) == 3
     assert count_safe_stops(stopping, 2.1, standing, np.array([False])) == 5, "it does not count"
@@ -146,7 +140,7 @@ def test_body_that_is_never_on_the_path_takes_no_room() -> None:
 
 
 def go(v_mps: float, target_mps: float) -> SpeedRamps:
-    return SpeedRamps(v_mps, 0.0, np.array([target_mps]), accel_mps2=0.3, decel_mps2=0.3, jerk_mps3=0.6)
+    return SpeedRamps(v_mps, 0.0, np.array([target_mps]), BrakeLimits(0.3, 0.6))
 
 
 def test_getting_through_before_it_comes() -> None:
