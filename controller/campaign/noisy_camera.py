@@ -40,7 +40,6 @@ class NoisyCamera:
         self, stage: Stage, camera: SimulatedCameraConfig, seed: int, noise: NoiseModel | None = None
     ) -> None:
         self._stage, self._noise = stage, noise or NoiseModel()
-        self._min_depth_m = camera.depth_min_m
         identity = Pose(np.eye(3), np.zeros(3))
         self._ego_motion = EgoMotion(identity, 1.0 / camera.fps, "none", math.nan, math.nan, math.nan)
         mount = stage.robot.camera_mount
@@ -51,9 +50,7 @@ class NoisyCamera:
         # A body that hangs above the robot is not an obstacle.
         is_obstacle = ~glass & (stage.world.z_m[:, 0] < stage.robot.body.height_m)
         to_optical = camera_in_body(mount_of(stage.robot)).rotation.T
-        self._tracks = NoisyTracks(
-            stage.world.z_m, is_obstacle, to_optical, self.planar_camera, mount.height_m, camera, self._noise
-        )
+        self._tracks = NoisyTracks(is_obstacle, to_optical, self.planar_camera, 1.0 / camera.fps, self._noise)
 
     def look(self, t_s: float, sequence: int, true_pose: PlanarPose, odometry_pose: PlanarPose) -> Scene:
         """The scene of an exposure at t_s. odometry_pose: the robot's pose by odometry."""
@@ -81,7 +78,6 @@ class NoisyCamera:
             self._has_depth,
             self._glass,
             self._random.standard_normal(len(view.free_m)),
-            self._min_depth_m,
         )
         return FreeSpace(
             planar_camera.bearing_tan,
@@ -94,7 +90,7 @@ class NoisyCamera:
         )
 
 
-@compiled(PlanarView, PlanarCamera, NoiseModel, "boolean[::1], boolean[::1], float64[::1], float64")
+@compiled(PlanarView, PlanarCamera, NoiseModel, "boolean[::1], boolean[::1], float64[::1]")
 def _scan_bands(
     view: PlanarView,
     camera: PlanarCamera,
@@ -102,7 +98,6 @@ def _scan_bands(
     has_depth: NDArray[np.bool_],
     glass: NDArray[np.bool_],
     errors: FloatArray,
-    min_depth_m: float,
 ) -> tuple[FloatArray, NDArray[np.bool_]]:
     """nearest_m and known_m (2, B), and blank (B,) of FreeSpace.
 
@@ -129,7 +124,7 @@ def _scan_bands(
             surface += noise.depth_sigma_1pm * surface * surface * sigmas
         if not surface < range_m:
             surface = math.inf
-        blank[b] = surface < min_depth_m
+        blank[b] = surface < camera.min_depth_m
         nearest[b] = math.inf if blank[b] else surface
         known[b] = 0.0 if blank[b] else min(free_m[b], nearest_glass, range_m, surface)
     return distances, blank

@@ -7,12 +7,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from config.camera import SimulatedCameraConfig
 from controller.campaign.noise_model import NoiseModel
 from controller.campaign.view import Eye, PlanarCamera, PlanarView
 from hal.compiled import compiled, inlined
 from hal.directions import along_and_left
-from hal.types import FloatArray
+from hal.records import record
+from hal.types import Flags, FloatArray, Matrix, Vector
 from vision.scene import Obstacle
 
 BoolArray = NDArray[np.bool_]
@@ -29,30 +29,51 @@ _ID, _FIRST_S, _SEEN_S, _SIGHTINGS, _X, _Y, _VX, _VY, _WIDTH, _HEIGHT, _DEPTH, _
 _ERRORS, _COLUMNS = 13, 17
 
 
+@record(frozen=True, slots=True, eq=False)
+class _Draws:
+    """The random numbers of one frame.
+
+    errors: (N, 4), standard normal: the new parts of the errors. misses: (N,), uniform in 0..1: a body is
+    missed if its number is less than the miss rate at its distance.
+    """
+
+    errors: Matrix
+    misses: Vector
+
+
 class NoisyTracks:
-    """The tracks of N bodies. Once a frame: step(), then obstacles()."""
+    """The tracks of N bodies. Once a frame: step(), then obstacles().
+
+    tracks: (N, C), with the columns above.
+    is_obstacle: (N,), which are reported.
+    period_s: of the frames.
+    error_decay: share of the errors that stays from one frame to the next.
+    velocity_gain: low-pass gain with which measured velocities approach the true ones.
+    """
+
+    tracks: Matrix
+    is_obstacle: Flags
+    period_s: float
+    error_decay: float
+    velocity_gain: float
 
     def __init__(
         self,
-        z_m: FloatArray,
         is_obstacle: BoolArray,
         to_optical: FloatArray,
         camera: PlanarCamera,
-        camera_height_m: float,
-        config: SimulatedCameraConfig,
+        period_s: float,
         noise: NoiseModel,
     ) -> None:
-        """z_m (N, 2): lowest and highest point of the bodies. is_obstacle (N,): which are reported.
-        to_optical (3, 3): rotates ahead, left, up of the camera into its optical axes."""
-        self._is_obstacle, self._to_optical = is_obstacle, np.ascontiguousarray(to_optical)
-        self._camera, self._noise = camera, noise
-        self._period_s, self._min_depth_m = 1.0 / config.fps, config.depth_min_m
-        low_m, high_m = z_m.T
-        self._centre_height_m = 0.5 * (low_m + high_m) - camera_height_m
-        self._tracks = np.zeros((len(z_m), _COLUMNS))
-        self._tracks[:, _FIRST_S], self._tracks[:, _SEEN_S] = np.nan, -np.inf
-        self._tracks[:, _HEIGHT] = high_m - low_m
-        self._error_decay, self._velocity_gain = 0.0, -math.expm1(-self._period_s / noise.velocity_lag_s)
+        """to_optical (3, 3): rotates ahead, left, up of the camera into its optical axes."""
+        self.is_obstacle, self._to_optical = is_obstacle, np.ascontiguousarray(to_optical)
+        self._camera, self._noise, self.period_s = camera, noise, period_s
+        low_m, high_m = camera.z_m.T
+        self._centre_height_m = 0.5 * (low_m + high_m) - camera.height_m
+        self.tracks = np.zeros((len(is_obstacle), _COLUMNS))
+        self.tracks[:, _FIRST_S], self.tracks[:, _SEEN_S] = np.nan, -np.inf
+        self.tracks[:, _HEIGHT] = high_m - low_m
+        self.error_decay, self.velocity_gain = 0.0, -math.expm1(-period_s / noise.velocity_lag_s)
 
     def step(
         self, view: PlanarView, velocity_mps: FloatArray, t_s: float, random: np.random.Generator
@@ -62,28 +83,15 @@ class NoisyTracks:
         Errors change slowly, measured velocities follow the true ones (N, 2), and bodies that are not seen
         keep their last measured velocity.
         """
-        new_errors = random.standard_normal((len(self._tracks), _COLUMNS - _ERRORS))
-        self._tracks = _stepped(
-            self._tracks,
-            view,
-            self._camera,
-            self._noise,
-            velocity_mps,
-            self._is_obstacle,
-            new_errors,
-            random.random(len(self._tracks)),
-            self._error_decay,
-            self._velocity_gain,
-            self._min_depth_m,
-            t_s,
-            self._period_s,
-        )
-        self._error_decay = math.exp(-self._period_s / self._noise.correlation_s)
+        errors = random.standard_normal((len(self.tracks), _COLUMNS - _ERRORS))
+        draws = _Draws(errors, random.random(len(self.tracks)))
+        self.tracks = _stepped(self, draws, view, self._camera, self._noise, velocity_mps, t_s)
+        self.error_decay = math.exp(-self.period_s / self._noise.correlation_s)
 
     def obstacles(self, view: PlanarView, t_s: float) -> tuple[Obstacle, ...]:
         """The obstacles as perception reports them for this view."""
         reported, vectors = _reported(
-            self._tracks, self._centre_height_m, self._to_optical, view.camera_pose, t_s, self._noise
+            self.tracks, self._centre_height_m, self._to_optical, view.camera_pose, t_s, self._noise
         )
         return tuple(
             [
@@ -108,42 +116,34 @@ class NoisyTracks:
 
 
 @inlined
-def _predict(
-    tracks: FloatArray,
-    velocity_mps: FloatArray,
-    new_errors: FloatArray,
-    seen_since_s: float,
-    decay: float,
-    velocity_gain: float,
-    dt_s: float,
-) -> None:
-    """Predict the tracks (N, C) by dt_s. decay: ratio of the old errors that stays; new_errors: (N, 4).
-    velocity_gain: low-pass gain with which the measured velocities of bodies seen since seen_since_s approach
-    the true ones (N, 2)."""
-    innovation = math.sqrt(1.0 - decay * decay)
+def _predicted(
+    known: NoisyTracks, new_errors: FloatArray, velocity_mps: FloatArray, t_s: float
+) -> FloatArray:
+    """(N, C) the tracks of a frame before, predicted for t_s. velocity_mps (N, 2): the true ones."""
+    tracks, dt_s, decay = known.tracks.copy(), known.period_s, known.error_decay
+    seen_since_s, innovation = t_s - _MAX_UNSEEN_FRAMES * dt_s, math.sqrt(1.0 - decay * decay)
     for k in range(len(tracks)):
         track = tracks[k]
         if track[_SEEN_S] > seen_since_s:
-            track[_VX] += velocity_gain * (velocity_mps[k, 0] - track[_VX])
-            track[_VY] += velocity_gain * (velocity_mps[k, 1] - track[_VY])
+            track[_VX] += known.velocity_gain * (velocity_mps[k, 0] - track[_VX])
+            track[_VY] += known.velocity_gain * (velocity_mps[k, 1] - track[_VY])
         track[_X] += track[_VX] * dt_s
         track[_Y] += track[_VY] * dt_s
         for j in range(new_errors.shape[1]):
             track[_ERRORS + j] = decay * track[_ERRORS + j] + innovation * new_errors[k, j]
+    return tracks
 
 
 @inlined
-def _visible_extent(
-    forward_m: FloatArray, bearing_tan: FloatArray, half_width_tan: float, min_depth_m: float
-) -> tuple[float, float, float, float]:
+def _visible_extent(forward_m: FloatArray, camera: PlanarCamera) -> tuple[float, float, float, float]:
     """The extent (near, far, left, right) of a body by the bands (B,) that show it; near: inf if none."""
     near, far, left, right = math.inf, -math.inf, math.inf, -math.inf
-    for b in range(len(bearing_tan)):
+    for b in range(len(forward_m)):
         z = forward_m[b]
-        if z < math.inf and z >= min_depth_m:
+        if z < math.inf and z >= camera.min_depth_m:
             near, far = min(near, z), max(far, z)
-            left, right = min(left, z * bearing_tan[b]), max(right, z * bearing_tan[b])
-    return near, far, left - near * half_width_tan, right + near * half_width_tan
+            left, right = min(left, z * camera.bearing_tan[b]), max(right, z * camera.bearing_tan[b])
+    return near, far, left - near * camera.half_width_tan, right + near * camera.half_width_tan
 
 
 @inlined
@@ -159,47 +159,27 @@ def _update_motion(track: FloatArray, fast: bool, dt_s: float, noise: NoiseModel
             track[_FAST_S] = track[_MOVING] = 0.0
 
 
-@compiled(
-    "float64[:, ::1]",
-    PlanarView,
-    PlanarCamera,
-    NoiseModel,
-    "float64[:, ::1], boolean[::1], float64[:, ::1], float64[::1],"
-    "float64, float64, float64, float64, float64",
-)
+@compiled(NoisyTracks, _Draws, PlanarView, PlanarCamera, NoiseModel, "float64[:, ::1], float64")
 def _stepped(
-    tracks: FloatArray,
+    known: NoisyTracks,
+    draws: _Draws,
     view: PlanarView,
     camera: PlanarCamera,
     noise: NoiseModel,
     velocity_mps: FloatArray,
-    is_obstacle: BoolArray,
-    new_errors: FloatArray,
-    draws: FloatArray,
-    decay: float,
-    velocity_gain: float,
-    min_depth_m: float,
     t_s: float,
-    dt_s: float,
 ) -> FloatArray:
-    """The tracks (N, C) after a frame with this view. velocity_mps, new_errors, decay and velocity_gain: as
-    for _predict().
-
-    A body is missed if its random draw (N,) in 0..1 is less than the miss rate at its distance.
-    """
+    """(N, C) the tracks after a frame with this view at t_s. velocity_mps (N, 2): the true ones."""
     camera_x, camera_y, cos, sin = view.camera_pose
-    tracks = tracks.copy()
-    _predict(tracks, velocity_mps, new_errors, t_s - _MAX_UNSEEN_FRAMES * dt_s, decay, velocity_gain, dt_s)
+    tracks, dt_s = _predicted(known, draws.errors, velocity_mps, t_s), known.period_s
     last_id = tracks[:, _ID].max() if len(tracks) else 0.0
     for row in range(len(view.bodies)):
         body = view.bodies[row]
-        near, far, left, right = _visible_extent(
-            view.forward_m[row], camera.bearing_tan, camera.half_width_tan, min_depth_m
-        )
+        near, far, left, right = _visible_extent(view.forward_m[row], camera)
         miss_probability = max(
             noise.miss_rate, noise.miss_rate_at_range * (2.0 * near / camera.range_m - 1.0)
         )
-        if math.isinf(near) or not is_obstacle[body] or draws[body] < miss_probability:
+        if math.isinf(near) or not known.is_obstacle[body] or draws.misses[body] < miss_probability:
             continue
         track = tracks[body]
         if track[_SIGHTINGS] == 0.0:

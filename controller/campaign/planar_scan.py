@@ -33,8 +33,8 @@ class PlanarScanner:
         self._front_m = stage.robot.body.front_m
         z_m = self._world.z_m
         self._at_height = (z_m[:, 0] <= SCAN_HEIGHT_M) & (z_m[:, 1] > SCAN_HEIGHT_M)
-        self._angles = np.linspace(-0.5 * _FIELD_OF_VIEW_RAD, 0.5 * _FIELD_OF_VIEW_RAD, _RAYS)
-        self._cos, self._sin = np.cos(self._angles), np.sin(self._angles)
+        angles = np.linspace(-0.5 * _FIELD_OF_VIEW_RAD, 0.5 * _FIELD_OF_VIEW_RAD, _RAYS)
+        self._rays = np.stack((np.cos(angles), np.sin(angles)))
         self._next_s = 0.0
         self._points: FloatArray = np.zeros((0, 2))
         self._scan_pose: PlanarPose | None = None
@@ -53,38 +53,32 @@ class PlanarScanner:
 
     def _scan(self, pose: PlanarPose, t_s: float) -> FloatArray:
         polygons = self._world.snapshot(t_s)[0][self._at_height]
-        shift = pose.x_m, pose.y_m, pose.heading_rad, self._front_m
-        nearest = _ray_lengths(_NOTHING, self._world.room_polygon()[None], self._cos, self._sin, *shift)
-        nearest = _ray_lengths(nearest, polygons, self._cos, self._sin, *shift)
+        nearest = _ray_lengths(_NOTHING, self._world.room_polygon()[None], self._rays, pose, self._front_m)
+        nearest = _ray_lengths(nearest, polygons, self._rays, pose, self._front_m)
         in_range = nearest < _RANGE_M
-        x = nearest[in_range] * self._cos[in_range] + self._front_m
-        return np.stack((x, nearest[in_range] * self._sin[in_range]), axis=1)
+        ahead_m, left_m = nearest[in_range] * self._rays[:, in_range]
+        return np.stack((ahead_m + self._front_m, left_m), axis=1)
 
 
-@compiled("float64[:], float64[:, :, ::1], float64[:], float64[:], float64, float64, float64, float64")
+@compiled("float64[:], float64[:, :, ::1], float64[:, ::1]", PlanarPose, "float64")
 def _ray_lengths(
-    max_m: FloatArray,
-    polygons: FloatArray,
-    ray_cos: FloatArray,
-    ray_sin: FloatArray,
-    x_m: float,
-    y_m: float,
-    heading_rad: float,
-    front_m: float,
+    max_m: FloatArray, polygons: FloatArray, rays: FloatArray, body: PlanarPose, front_m: float
 ) -> FloatArray:
-    """The lengths (R,) of rays up to the first edge of polygons (N, K, 2), at most max_m. The rays begin
-    front_m ahead of a body at x_m, y_m; their angles are relative to its heading."""
-    cos, sin = math.cos(heading_rad), math.sin(heading_rad)
+    """(R,) lengths of rays up to the first edge of polygons (N, K, 2), at most max_m.
+
+    rays (2, R): cosines and sines of their angles to the heading of a body. They begin front_m ahead of it.
+    """
+    cos, sin = math.cos(body.heading_rad), math.sin(body.heading_rad)
     nearest, corners = max_m.copy(), polygons.shape[1]
     forward, left = np.empty(corners), np.empty(corners)
     for polygon in polygons:
         for j in range(corners):
-            along_m, left[j] = along_and_left(polygon[j, 0] - x_m, polygon[j, 1] - y_m, cos, sin)
+            along_m, left[j] = along_and_left(polygon[j, 0] - body.x_m, polygon[j, 1] - body.y_m, cos, sin)
             forward[j] = along_m - front_m
         for j in range(corners):
             next_corner = (j + 1) % corners
             for ray in range(len(nearest)):
-                c, s = ray_cos[ray], ray_sin[ray]
+                c, s = rays[0, ray], rays[1, ray]
                 side = left[j] * c - forward[j] * s
                 next_side = left[next_corner] * c - forward[next_corner] * s
                 if side * next_side > 0.0:

@@ -14,7 +14,7 @@ from config.robot import Mount
 from hal.compiled import compiled, inlined
 from hal.directions import along_and_left
 from hal.records import record
-from hal.types import FloatArray, Integers, Matrix, PlanarPose, Vector
+from hal.types import Flags, FloatArray, Integers, Matrix, PlanarPose, Vector
 from sim.planar import PlanarWorld
 from vision.scene import NEVER_M
 
@@ -51,14 +51,24 @@ class PlanarCamera:
 
     bearing_tan: (B,), right divided by forward, of the ray of each band.
     half_width_tan: half the width of a band, in the same unit.
-    range_m: how far it sees.
-    floor_from_m, up_tan: as in FreeSpace.
+    edge_tan: the same of the farther one of both side edges.
+    min_depth_m, range_m: from where to where it measures depth.
+    height_m: over the floor.
+    floor_from_m, up_tan: as in FreeSpace. down_tan: slope of the lower edge.
+    z_m: (N, 2), lowest and highest point of the bodies.
+    occludes: (N,), which of them hide the floor behind them.
     """
 
     bearing_tan: Vector
     half_width_tan: float
+    edge_tan: float
+    min_depth_m: float
     range_m: float
+    height_m: float
+    down_tan: float
     up_tan: float
+    z_m: Matrix
+    occludes: Flags
 
     def __init__(
         self,
@@ -68,36 +78,25 @@ class PlanarCamera:
         max_underside_m: float = math.inf,
     ) -> None:
         """max_underside_m: a body with a higher underside does not occlude the floor behind it."""
-        self._mount, self._z_m, self._room = mount, world.z_m, world.room_polygon()
-        self.range_m = camera.depth_max_m
+        self._mount, self.z_m, self._room = mount, world.z_m, world.room_polygon()
+        self.min_depth_m, self.range_m, self.height_m = camera.depth_min_m, camera.depth_max_m, mount.height_m
         left, right = (-0.5 - camera.cx) / camera.fx, (camera.width - 0.5 - camera.cx) / camera.fx
         edges = np.linspace(left, right, BANDS + 1) / math.cos(mount.pitch_rad)
         self.bearing_tan = 0.5 * (edges[1:] + edges[:-1])
         self.half_width_tan = 0.5 * float(edges[1] - edges[0])
-        self._edge_tan = max(-float(edges[0]), float(edges[-1]))
+        self.edge_tan = max(-float(edges[0]), float(edges[-1]))
         down = math.atan((camera.height - 0.5 - camera.cy) / camera.fy) + mount.pitch_rad
         up = math.atan((camera.cy + 0.5) / camera.fy) - mount.pitch_rad
-        self._down_tan, self.up_tan = math.tan(down), math.tan(up)
-        sees_floor = self._down_tan > mount.height_m / NEVER_M
-        self.floor_from_m = mount.height_m / self._down_tan if sees_floor else NEVER_M
-        z_m = self._z_m
-        self._occludes = (z_m[:, 0] < min(mount.height_m, max_underside_m)) & (z_m[:, 1] > mount.height_m)
+        self.down_tan, self.up_tan = math.tan(down), math.tan(up)
+        sees_floor = self.down_tan > mount.height_m / NEVER_M
+        self.floor_from_m = mount.height_m / self.down_tan if sees_floor else NEVER_M
+        low_m, high_m = self.z_m.T
+        self.occludes = (low_m < min(mount.height_m, max_underside_m)) & (high_m > mount.height_m)
 
     def look(self, polygons: FloatArray, pose: PlanarPose) -> PlanarView:
         """The view from the robot at pose. polygons: (N, K, 2), footprints of all bodies."""
         camera_pose = self.camera_pose(pose)
-        bodies, forward_m, free_m = _render(
-            self,
-            polygons,
-            self._room,
-            self._z_m,
-            self._occludes,
-            self._edge_tan,
-            self._down_tan,
-            self._mount.height_m,
-            camera_pose,
-        )
-        return PlanarView(bodies, forward_m, free_m, camera_pose)
+        return PlanarView(*_render(self, polygons, self._room, camera_pose), camera_pose)
 
     def camera_pose(self, pose: PlanarPose) -> Eye:
         """The camera of a robot at pose."""
@@ -175,24 +174,12 @@ def _add_thin_body(
                 hits[b] = nearest
 
 
-@compiled(
-    PlanarCamera,
-    "float64[:, :, ::1], float64[:, ::1], float64[:, ::1], boolean[::1], float64, float64, float64,"
-    "UniTuple(float64, 4)",
-)
+@compiled(PlanarCamera, "float64[:, :, ::1], float64[:, ::1], UniTuple(float64, 4)")
 def _render(
-    camera: PlanarCamera,
-    polygons: FloatArray,
-    room: FloatArray,
-    z_m: FloatArray,
-    occludes: BoolArray,
-    edge_tan: float,
-    down_tan: float,
-    height_m: float,
-    eye: Eye,
+    camera: PlanarCamera, polygons: FloatArray, room: FloatArray, eye: Eye
 ) -> tuple[IntArray, FloatArray, FloatArray]:
-    """The fields of PlanarView for a camera at eye, height_m above the floor."""
-    bearing_tan, range_m = camera.bearing_tan, camera.range_m
+    """The fields of PlanarView for a camera at eye."""
+    bearing_tan, range_m, height_m = camera.bearing_tan, camera.range_m, camera.height_m
     count, corners, bands = len(polygons), polygons.shape[1], len(bearing_tan)
     bodies, hits = np.empty(count, np.intp), np.empty((count, bands))
     forward, right, free = np.empty(len(room) + 1), np.empty(len(room) + 1), np.empty(bands)
@@ -201,23 +188,21 @@ def _render(
     forward, right, in_view = np.empty(corners + 1), np.empty(corners + 1), 0
     for k in range(count):
         _in_camera(polygons[k], eye, forward, right)
-        if not _may_be_in_view(forward, right, edge_tan, range_m):
+        if not _may_be_in_view(forward, right, camera.edge_tan, range_m):
             continue
         if not _cast_rays(forward, right, bearing_tan, hits[in_view]):
             _add_thin_body(forward, right, bearing_tan, camera.half_width_tan, hits[in_view])
-        if occludes[k]:
+        if camera.occludes[k]:
             for b in range(bands):
                 free[b] = min(free[b], hits[in_view, b])
         bodies[in_view] = k
         in_view += 1
     for row in range(in_view):
-        low_m, high_m = z_m[bodies[row], 0], z_m[bodies[row], 1]
+        low_m, high_m = camera.z_m[bodies[row]]
         for b in range(bands):
             z = hits[row, b]
             # A body is in the frame if part of its height is between the upper and lower edge of the image.
-            in_frame = (
-                z < range_m and high_m > height_m - z * down_tan and low_m < height_m + z * camera.up_tan
-            )
-            if z > free[b] + _TOLERANCE_M or not in_frame:
+            in_frame = high_m > height_m - z * camera.down_tan and low_m < height_m + z * camera.up_tan
+            if z > free[b] + _TOLERANCE_M or not (z < range_m and in_frame):
                 hits[row, b] = math.inf
     return bodies[:in_view], hits[:in_view], free
