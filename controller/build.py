@@ -32,7 +32,7 @@ from controller.decision.decide import DecisionMaker
 from controller.follow import PathFollower
 from controller.path.path import Path, PathError
 from controller.perceive import Perceiver
-from controller.record.recorder import Surroundings
+from controller.record.recorder import VideoSettings
 from controller.shape import SpeedShaper
 from hal.api import Chassis, Clock, DatagramLink, FrameSource, OdometrySource
 from hal.cameras.bag_file import is_bag
@@ -212,9 +212,9 @@ def build_world(config: AppConfig) -> World:
     return World(scenario_of(config), config.simulation.seed)
 
 
-def surroundings(config: AppConfig) -> Surroundings:
+def video_settings(config: AppConfig) -> VideoSettings:
     """What a video shows around the observations."""
-    return Surroundings(
+    return VideoSettings(
         mount_of(config.robot),
         config.robot.body,
         config.robot.body.width_m / 2.0 + config.decision.margins.lateral_m,

@@ -23,7 +23,7 @@ _MIN_M, _MIN_RAD = 0.1, 0.1
 
 
 @record(frozen=True, slots=True)
-class Motion:
+class FrameMotion:
     """Distance ahead (negative: backwards) and turn to the left in one frame."""
 
     ahead_m: float
@@ -35,9 +35,9 @@ class Contradiction:
 
     def __init__(self) -> None:
         self.sentence = ""
-        self._frames: deque[tuple[bool, Motion, Motion]] = deque(maxlen=_FRAMES)
+        self._frames: deque[tuple[bool, FrameMotion, FrameMotion]] = deque(maxlen=_FRAMES)
 
-    def add(self, told: Motion, seen: Motion, *, disputed: bool) -> None:
+    def add(self, told: FrameMotion, seen: FrameMotion, *, disputed: bool) -> None:
         """Add a frame: its motion by the odometry (told) and by the images (seen)."""
         self._frames.append((disputed, told, seen))
         told_m = sum(told.ahead_m for disputed, told, _ in self._frames if disputed)

@@ -22,7 +22,7 @@ from collections import deque
 
 import numpy as np
 
-from controller.base.contradiction import Contradiction, Motion
+from controller.base.contradiction import Contradiction, FrameMotion
 from hal.clocks import NS_PER_S
 from hal.geometry import body_in_floor, camera_in_body, camera_in_floor, wrap_angle_rad
 from hal.types import CameraMount, PlanarPose, Pose
@@ -175,7 +175,7 @@ class Localiser:
         distance_m, odometry_rad = _increment(before, after)
         ahead_m = float(self._camera_in_body[0] @ ego.motion.translation_m)
         disputed = ego.source == "disputed"
-        told, visual = Motion(distance_m, odometry_rad), Motion(ahead_m, visual_rad)
+        told, visual = FrameMotion(distance_m, odometry_rad), FrameMotion(ahead_m, visual_rad)
         self._contradiction.add(told, visual, disputed=disputed)
         if disputed:
             return

@@ -21,7 +21,7 @@ from controller.build import (
     build_perceiver,
     build_simulation,
     open_faulty_camera,
-    surroundings,
+    video_settings,
 )
 from controller.build_chassis import build_base
 from controller.campaign.drive_log import DriveLog
@@ -85,7 +85,7 @@ def _drive(stage: Stage, config: AppConfig, policy: str, keep: FilePath | None) 
         devices.enter_context(simulation)
         devices.enter_context(chassis)
         devices.enter_context(camera)
-        files = devices.enter_context(open_recorder(options, surroundings(config)))
+        files = devices.enter_context(open_recorder(options, video_settings(config)))
         recorder = RunRecorder(files, path)
         perceiver = build_perceiver(config, loop.localiser, loop.localiser.body_pose, time.perf_counter_ns)
         monitor = _ProgressMonitor(stage, simulation, log)

@@ -91,7 +91,8 @@ class StandingLimits:
             if near.block_to_s_m <= s_m:
                 continue
             track_id, gap_m = near.track_id, near.block_from_s_m - s_m
-            if self._stays_clear(near, motion.v_mps, now_s):
+            self._note_clear(near, motion.v_mps, now_s)
+            if self._has_long_been_clear(track_id, now_s):
                 self._inside.discard(track_id)
             beside_m = margins.lateral_m + (margins.graze_m if track_id in self._inside else 0.0)
             if gap_m < -ALONGSIDE_M:
@@ -110,12 +111,15 @@ class StandingLimits:
             )
         return found
 
-    def _stays_clear(self, near: _Near, v_mps: float, now_s: float) -> bool:
-        """Whether a body has been clear of the lateral margin for long, while the robot stands."""
+    def _note_clear(self, near: _Near, v_mps: float, now_s: float) -> None:
+        """Note since when a body has been clear of the lateral margin while the robot stands."""
         if v_mps > STANDING_MPS or near.clearance_m <= self._config.margins.lateral_m:
             self._clear_since_s.pop(near.track_id, None)
-            return False
-        return now_s - self._clear_since_s.setdefault(near.track_id, now_s) >= _CLEAR_FOR_S
+        else:
+            self._clear_since_s.setdefault(near.track_id, now_s)
+
+    def _has_long_been_clear(self, track_id: int, now_s: float) -> bool:
+        return now_s - self._clear_since_s.get(track_id, math.inf) >= _CLEAR_FOR_S
 
     def _take_in(self, known: WorldModel, s_m: float) -> None:
         """Place the standing bodies of a new scene, or along a new path, and drop those too far aside.

@@ -15,7 +15,7 @@ from controller.build import (
     build_perceiver,
     build_simulation,
     open_faulty_camera,
-    surroundings,
+    video_settings,
 )
 from controller.build_chassis import build_base
 from controller.errors import UserError
@@ -99,7 +99,7 @@ def drive_lockstep(
         devices.enter_context(simulation)
         devices.enter_context(chassis)
         devices.enter_context(camera)
-        recorder = devices.enter_context(open_recorder(recording, surroundings(config)))
+        recorder = devices.enter_context(open_recorder(recording, video_settings(config)))
         stop = StopRequest().listen()
         devices.callback(stop.closing)
         loop = build_control(config, chassis)

@@ -12,7 +12,7 @@ from functools import partial
 
 from config.app import AppConfig, RealtimeRunner
 from controller.base.localise import PoseHistory
-from controller.build import build_path, build_perceiver, open_camera, surroundings
+from controller.build import build_path, build_perceiver, open_camera, video_settings
 from controller.control import ControlStep
 from controller.errors import UserError, describe
 from controller.realtime.channel import Channel, PeerGone
@@ -151,7 +151,7 @@ def _look_until_the_end(
     body = RemoteBody(channel, mount_of(config.robot), path.start)
     with (
         open_camera(config, MonotonicClock(), body.true_pose, start_ns) as camera,
-        open_recorder(recording, surroundings(config), partial(_say_cut_off, channel)) as recorder,
+        open_recorder(recording, video_settings(config), partial(_say_cut_off, channel)) as recorder,
     ):
         perceiver = build_perceiver(config, body, body.body_pose, time.perf_counter_ns)
         run_recorder = RunRecorder(recorder, path)

@@ -57,8 +57,8 @@ class RecordingOptions:
 
 
 @dataclass(frozen=True, slots=True)
-class Surroundings:
-    """What the video shows around the observations; None: not known. fps: pictures a second."""
+class VideoSettings:
+    """What the video shows besides the observations; None: not known. fps: pictures a second."""
 
     mount: CameraMount | None
     body: Body | None
@@ -76,7 +76,7 @@ class Recorder:
         observations: ObservationFile | None,
         video: PacedVideo | None,
         frames: FrameRecorder | None,
-        surroundings: Surroundings,
+        settings: VideoSettings,
         timed: bool,
         output_isolation: OutputIsolation | None = None,
     ) -> None:
@@ -84,8 +84,8 @@ class Recorder:
         self._observations = observations
         self._video = video
         self._frames = frames
-        self._composer = Composer(surroundings.top_speed_mps, surroundings.range_m)
-        self._surroundings = surroundings
+        self._composer = Composer(settings.top_speed_mps, settings.range_m)
+        self._settings = settings
         self._timed = timed
 
     @property
@@ -112,7 +112,7 @@ class Recorder:
             with self._isolation.guard(frames):
                 frames.write(look.frame, look.camera_pose)
         if video is not None and self._isolation.is_active(video):
-            surroundings = self._surroundings
+            settings = self._settings
             moment = VideoMoment(
                 look.frame,
                 look.scene,
@@ -120,10 +120,10 @@ class Recorder:
                 decision,
                 commanded_mps,
                 measured_mps,
-                surroundings.mount,
-                surroundings.body,
+                settings.mount,
+                settings.body,
                 path_ahead_m,
-                surroundings.corridor_half_width_m,
+                settings.corridor_half_width_m,
                 ending,
             )
             with self._isolation.guard(video):
@@ -151,7 +151,7 @@ def require_writable(options: RecordingOptions) -> None:
 
 @contextmanager
 def open_recorder(
-    options: RecordingOptions, surroundings: Surroundings, cut_off: Callable[[str], None] | None = None
+    options: RecordingOptions, settings: VideoSettings, cut_off: Callable[[str], None] | None = None
 ) -> Iterator[Recorder]:
     """A recorder whose files are complete when the block ends. cut_off: see OutputIsolation.
 
@@ -166,14 +166,14 @@ def open_recorder(
         if options.video is not None:
             # A replay waits for the encoder; a drive in real time must not.
             in_real_time = cut_off is not None
-            fps = min(surroundings.fps, MAX_REAL_TIME_FPS) if in_real_time else surroundings.fps
+            fps = min(settings.fps, MAX_REAL_TIME_FPS) if in_real_time else settings.fps
             paced = PacedVideo(VideoWriter(options.video, fps), fps, may_drop=in_real_time)
             video = files.enter_context(output_isolation.open(paced))
         if options.frames is not None:
-            writer = files.enter_context(TumWriter(options.frames, surroundings.mount))
+            writer = files.enter_context(TumWriter(options.frames, settings.mount))
             recorder = FrameRecorder(writer, options.frames, may_drop=options.timed)
             frames = files.enter_context(output_isolation.open(recorder))
-        yield Recorder(observations, video, frames, surroundings, options.timed, output_isolation)
+        yield Recorder(observations, video, frames, settings, options.timed, output_isolation)
 
 
 class RunRecorder:

@@ -1,4 +1,4 @@
-"""Composition of a replay: perception, decision and the surroundings of a video, for a recording.
+"""Composition of a replay: perception, decision and the settings of a video, for a recording.
 
 The recording itself is opened by open_replay in controller/build.py, which names the concrete devices.
 """
@@ -11,7 +11,7 @@ from config.app import ReplayConfig
 from controller.build import REPLAY_FPS, limit_vision_threads
 from controller.decision.decide import DecisionMaker
 from controller.perceive import Perceiver
-from controller.record.recorder import Surroundings
+from controller.record.recorder import VideoSettings
 from hal.api import OdometrySource
 from hal.types import CameraMount, PlanarPose
 from vision.perception import Perception
@@ -50,9 +50,11 @@ def _replay_fps(fps: float | None) -> float:
     return REPLAY_FPS if fps is None else max(fps, _LEAST_FPS)
 
 
-def replay_surroundings(config: ReplayConfig, mount: CameraMount | None, fps: float | None) -> Surroundings:
+def replay_video_settings(
+    config: ReplayConfig, mount: CameraMount | None, fps: float | None
+) -> VideoSettings:
     """What a replay's video shows around the observations. fps: of the recording; None if not known."""
-    return Surroundings(
+    return VideoSettings(
         mount,
         config.robot.body if mount is not None else None,
         config.robot.body.width_m / 2.0 + config.decision.margins.lateral_m,

@@ -26,7 +26,7 @@ from controller.perceive import Look
 from controller.record.observations import STANDARD_OUTPUT
 from controller.record.recorder import STRAIGHT_AHEAD_M, RecordingOptions, open_recorder, require_two_files
 from controller.record.tally import ConditionTally, TimingTally
-from controller.replay.build import build_replay_decision, build_replay_perceiver, replay_surroundings
+from controller.replay.build import build_replay_decision, build_replay_perceiver, replay_video_settings
 from controller.terminal.console import Console
 from hal.cameras.bag_topics import WantedTopics
 from hal.cameras.gyro_track import GyroTrack
@@ -102,7 +102,7 @@ def run_replay(options: ReplayOptions) -> None:
     with ExitStack() as devices:
         devices.enter_context(source)
         recorder = devices.enter_context(
-            open_recorder(recording, replay_surroundings(config, mount, source.fps))
+            open_recorder(recording, replay_video_settings(config, mount, source.fps))
         )
         while True:
             try:

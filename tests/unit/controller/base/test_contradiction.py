@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from config.robot import Robot
-from controller.base.contradiction import Contradiction, Motion
+from controller.base.contradiction import Contradiction, FrameMotion
 from controller.base.drive_lifecycle import Outcome
 from controller.base.driven_base import DrivenBase
 from controller.base.localise import Localiser
@@ -32,8 +32,8 @@ def told_after(
     contradiction = Contradiction()
     for k in range(60 * 30):
         disputed = k % disputed_of == 0
-        told = Motion(told_mps * FRAME_S, told_radps * FRAME_S)
-        seen = Motion(seen_mps * FRAME_S, seen_radps * FRAME_S) if disputed else told
+        told = FrameMotion(told_mps * FRAME_S, told_radps * FRAME_S)
+        seen = FrameMotion(seen_mps * FRAME_S, seen_radps * FRAME_S) if disputed else told
         contradiction.add(told, seen, disputed=disputed)
         if contradiction.sentence:
             return k * FRAME_S, contradiction.sentence

@@ -18,7 +18,7 @@ from controller.record.recorder import (
     Recorder,
     RecordingOptions,
     RunRecorder,
-    Surroundings,
+    VideoSettings,
     open_recorder,
     path_ahead,
 )
@@ -26,7 +26,7 @@ from hal.types import CameraMount, ColourImage, PlanarPose
 from tests.support.runner_doubles import EmptyScenePerceiver, PeriodicCamera, control_step
 from tests.support.video_moments import frame
 
-AROUND = Surroundings(CameraMount(0.45, 0.0, 0.6, 0.07), Body(), 0.54, 30.0, 1.5, 10.0)
+AROUND = VideoSettings(CameraMount(0.45, 0.0, 0.6, 0.07), Body(), 0.54, 30.0, 1.5, 10.0)
 STRAIGHT = Path(PathSpec(segments=(LineSpec(kind="line", length_m=20.0),)), Robot())
 
 
