@@ -90,10 +90,9 @@ class SpeedShaper:
         """The acceleration commanded last."""
         return self._a
 
-    def reset(self, v_mps: float = 0.0) -> None:
-        """Start again from a measured speed, after a fault or while the chassis was not armed."""
-        known = v_mps if math.isfinite(v_mps) else 0.0
-        self._v, self._a = min(max(known, 0.0), self._limits.max_speed_mps), 0.0
+    def reset(self) -> None:
+        """Start again from rest: the chassis does not follow now."""
+        self._v, self._a = 0.0, 0.0
         self._active, self._to_end_m = self._comfort, math.inf
         self._lag.restart()
 
@@ -102,7 +101,7 @@ class SpeedShaper:
         self._lag.take_back()
 
     def begin_anew(self) -> None:
-        """Start again from rest, after a while in which the chassis did not answer."""
+        """Start again from rest, after a while in which the chassis did not follow: see unlearn_lag()."""
         self.unlearn_lag()
         self.reset()
 

@@ -30,7 +30,7 @@ from controller.mission.short_arcs import short_arc_warning
 from controller.realtime.mission import drive_realtime
 from controller.realtime.service import StopRequest
 from controller.record.observations import STANDARD_OUTPUT
-from controller.record.recorder import RecordingOptions, RunRecorder, open_recorder
+from controller.record.recorder import RunRecorder, open_recorder
 from controller.record.tally import SetpointTally
 from controller.terminal.console import Console
 from controller.terminal.summary import report, summary_rows
@@ -94,7 +94,7 @@ def drive_lockstep(
     simulation = build_simulation(config, emulator, clock.now_ns())
     camera = open_faulty_camera(config, clock, lambda _stamp_ns: simulation.body_pose, clock.now_ns())
     # Recordings must be repeatable, so durations that were measured on this machine are left out of them.
-    recording = RecordingOptions(options.observations, options.video, options.record, timed=False)
+    recording = options.recording(timed=False)
     with ExitStack() as devices:
         devices.enter_context(simulation)
         devices.enter_context(chassis)

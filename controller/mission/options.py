@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from controller.record.recorder import RecordingOptions
+
 
 @dataclass(frozen=True, slots=True)
 class MissionOptions:
@@ -17,3 +19,7 @@ class MissionOptions:
     video: Path | None = None
     record: Path | None = None
     quiet: bool = False
+
+    def recording(self, *, timed: bool = True) -> RecordingOptions:
+        """The files to write. timed: see there."""
+        return RecordingOptions(self.observations, self.video, self.record, timed)

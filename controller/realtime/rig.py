@@ -75,9 +75,8 @@ class RealtimeRig:
         """
         service = ServiceManager(os.environ, os.getpid())
         stop = StopRequest().listen()
-        recording = _recording(self.options)
         with (
-            perception_beside(self.config, self.start_ns, recording) as link,
+            perception_beside(self.config, self.start_ns, self.options.recording()) as link,
             console.beside_a_drive(),
         ):
             # After all else, so that processes and threads started before keep ordinary scheduling.
@@ -96,13 +95,7 @@ class RealtimeRig:
                 # The watchdog is no longer fed, and perception takes seconds to end and to close its files.
                 service.stopping(_why_over(loop.lifecycle))
                 stop.closing()
-        self._take_cut_off(link, console, "")
-
-    def _take_cut_off(self, link: PerceptionLink, console: Console, more: str) -> None:
-        """Warn of the outputs that have ended since the last call."""
-        for reason in link.take_cut_off():
-            self.cut_off.append(reason)
-            console.warning(reason + more)
+        warn_of_cut_off(link, self.cut_off, console)
 
     def _told(
         self,
@@ -123,7 +116,7 @@ class RealtimeRig:
             if link.newest is not None and not told_ready:
                 told_ready = True
                 on_ready(service)
-            self._take_cut_off(link, console, "; the drive goes on without it")
+            warn_of_cut_off(link, self.cut_off, console, "; the drive goes on without it")
             if lifecycle.stop_reason is not None:
                 service.stopping(lifecycle.stop_reason)
             yield moment
@@ -141,7 +134,7 @@ def _why_over(lifecycle: DriveLifecycle) -> str:
 def realtime_rig(config: AppConfig, runner: RealtimeRunner, options: MissionOptions) -> Iterator[RealtimeRig]:
     """Open the base, and the simulated world if there is one. Raises ConfigError, HalError, UserError."""
     require_camera(config)
-    require_writable(_recording(options))
+    require_writable(options.recording())
     clock = MonotonicClock()
     start_ns = clock.now_ns() + round(HEAD_START_S * NS_PER_S)
     start = build_path(config).start
@@ -157,8 +150,11 @@ def realtime_rig(config: AppConfig, runner: RealtimeRunner, options: MissionOpti
         yield RealtimeRig(config, runner, options, clock, start_ns, punctual, simulation, Punctuality())
 
 
-def _recording(options: MissionOptions) -> RecordingOptions:
-    return RecordingOptions(options.observations, options.video, options.record)
+def warn_of_cut_off(link: PerceptionLink, cut_off: list[str], console: Console, more: str = "") -> None:
+    """Warn of the outputs that have ended since the last call, and append why to cut_off."""
+    for reason in link.take_cut_off():
+        cut_off.append(reason)
+        console.warning(reason + more)
 
 
 @contextmanager

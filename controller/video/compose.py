@@ -30,22 +30,23 @@ from controller.video.top_view import TopView
 # Ranges to choose from, with round numbers on the scale of depth.
 _RANGES_M = (2.0, 4.0, 6.0)
 _STRIDE_PX = 8
+_HISTORY_S = 10.0  # that the speed strip shows
 _FAR_PERCENT = 95.0  # a few far pixels, such as of a window, do not count
 
 
 class Composer:
-    """Draws moments, in the order of time because the speed strip shows the last history_s.
+    """Draws moments, in the order of time because the speed strip shows the last seconds.
 
     top_speed_mps: the scale of the speed strip. range_m: the largest range of the top view and of the colours
     of depth. If everything is nearer, the range is a smaller one; it grows with what is seen, and never
     shrinks, so that pictures can be compared.
     """
 
-    def __init__(self, top_speed_mps: float = 1.5, range_m: float = 10.0, history_s: float = 10.0) -> None:
+    def __init__(self, top_speed_mps: float = 1.5, range_m: float = 10.0) -> None:
         self._max_range_m = range_m
         self._header = Header(HEADER)
         self._colour = ColourView(COLOUR_VIEW)
-        self._speed = SpeedStrip(SPEED_STRIP, top_speed_mps, history_s)
+        self._speed = SpeedStrip(SPEED_STRIP, top_speed_mps, _HISTORY_S)
         self._set_range(min(range_m, _RANGES_M[0]))
 
     def compose(self, moment: VideoMoment) -> Image:

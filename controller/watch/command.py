@@ -23,12 +23,11 @@ from controller.mission.command import with_overrides
 from controller.mission.options import MissionOptions
 from controller.mission.scenario_faults import with_scenario_faults
 from controller.realtime.messages import STREAM_ENDED
-from controller.realtime.perception_link import PerceptionLink
-from controller.realtime.rig import HEAD_START_S, perception_beside
+from controller.realtime.rig import HEAD_START_S, perception_beside, warn_of_cut_off
 from controller.realtime.runner import Punctuality, run_realtime
 from controller.realtime.service import ServiceManager, StopRequest
 from controller.record.observations import STANDARD_OUTPUT
-from controller.record.recorder import RecordingOptions, require_writable
+from controller.record.recorder import require_writable
 from controller.terminal.console import Console
 from controller.watch.loop import WatchLoop
 from controller.watch.no_base import NoBase
@@ -69,11 +68,10 @@ def run_watch(options: WatchOptions) -> int:
             "time; set it to 'realtime', as in config/sim-realtime.yaml"
         )
     console = Console(given.quiet, aside=given.observations == STANDARD_OUTPUT)
-    recording = RecordingOptions(given.observations, given.video, given.record)
     require_camera(config)
-    require_writable(recording)
+    require_writable(given.recording())
     result = WatchResult(mount=mount_of(config.robot))
-    loop = _watch(config, config.runner, options, recording, console, result)
+    loop = _watch(config, config.runner, options, console, result)
     console.summary(summary_rows(config, loop, result))
     return 0 if loop.outcome is Outcome.STOPPED and result.frames.processed and not result.cut_off else 1
 
@@ -82,7 +80,6 @@ def _watch(
     config: AppConfig,
     runner: RealtimeRunner,
     options: WatchOptions,
-    recording: RecordingOptions,
     console: Console,
     result: WatchResult,
 ) -> WatchLoop:
@@ -96,7 +93,7 @@ def _watch(
         # How long to watch is for the loop to say, not for the configuration of a drive.
         endless = runner.model_copy(update={"max_duration_s": None})
         with (
-            perception_beside(config, start_ns, recording) as link,
+            perception_beside(config, start_ns, options.mission.recording()) as link,
             console.beside_a_drive(),
         ):
             moments = run_realtime(endless, clock, simulation, link, loop, stop, Punctuality())
@@ -108,11 +105,11 @@ def _watch(
                     result.take_message(message)
                     view.take_message(message)
                 result.take(moment.control)
-                _take_cut_off(link, result, console, "; watching goes on without it")
+                warn_of_cut_off(link, result.cut_off, console, "; watching goes on without it")
                 view.show(result, moment.control)
             service.stopping(str(loop.reason))
             stop.closing()
-        _take_cut_off(link, result, console, "")
+        warn_of_cut_off(link, result.cut_off, console)
         if link.refused_reason is not None:
             raise DeviceRefused(link.refused_reason)
         if link.lost_reason == STREAM_ENDED and loop.outcome is Outcome.BROKEN_OFF:
@@ -143,10 +140,3 @@ def _open_base(
         return devices.enter_context(chassis), simulation
     except HalError as error:
         raise UserError(f"{error}; to look through the camera alone, add --no-chassis") from error
-
-
-def _take_cut_off(link: PerceptionLink, result: WatchResult, console: Console, more: str) -> None:
-    """Warn of the outputs that have ended since the last call."""
-    for reason in link.take_cut_off():
-        result.cut_off.append(reason)
-        console.warning(reason + more)

@@ -63,7 +63,8 @@ def test_a_robot_that_drives_stops_within_its_limits_and_says_why(told: tuple[st
     name, scan = told
     limits = Robot().limits
     bench, shaper = Bench(), SpeedShaper(limits, 0.02)
-    shaper.reset(1.0)
+    for _ in range(250):
+        shaper.step(1.0)
     bench.settle(v_mps=1.0)
     for _ in range(40):
         before_mps2 = shaper.a_mps2

@@ -34,7 +34,7 @@ AMBER = bgr("E69F00")
 GREY = bgr("7F8891")
 
 _LEFT, _RIGHT, _TOP, _BOTTOM = 78, 22, 50, 62  # pixels around the plot, for title, ticks and labels
-_TITLE, _LABEL, _TICK, _LEGEND = 21, 17, 15, 15  # sizes of the lettering
+_TITLE, _LABEL, _TICK, _LEGEND, _NOTE = 21, 17, 15, 15, 14  # sizes of the lettering
 
 Marker = Literal["circle", "square", "diamond", "cross"]
 
@@ -169,11 +169,12 @@ class Chart:
         """A dashed horizontal line, for a target."""
         self.line([self._x.low, self._x.high], [value, value], colour, label, dashed=True)
 
-    def annotate(self, x: float, y: float, words: str, colour: Colour = SOFT_INK, size: int = 14) -> None:
+    def annotate(self, x: float, y: float, words: str) -> None:
         """Words centred above a point."""
         u, v = self.to_px([x], [y])[0]
         if np.isfinite([u, v]).all():
-            text.put(self._image, words, round(u) - text.width(words, size) // 2, round(v) - 7, colour, size)
+            left = round(u) - text.width(words, _NOTE) // 2
+            text.put(self._image, words, left, round(v) - 7, SOFT_INK, _NOTE)
 
     def legend(self, where: Literal["upper right", "lower right", "lower left", "upper left"]) -> None:
         """A legend box with all labelled items, in the order in which they were drawn."""
