@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.campaign.noise_model import NoiseModel
-from controller.campaign.view import Eye, PlanarCamera, PlanarView
+from controller.campaign.view import PlanarCamera, PlanarView
+from controller.decision.surfaces import Eye
 from hal.compiled import compiled, inlined
 from hal.directions import along_and_left
 from hal.records import record
@@ -91,7 +92,7 @@ class NoisyTracks:
     def obstacles(self, view: PlanarView, t_s: float) -> tuple[Obstacle, ...]:
         """The obstacles as perception reports them for this view."""
         reported, vectors = _reported(
-            self.tracks, self._centre_height_m, self._to_optical, view.camera_pose, t_s, self._noise
+            self.tracks, self._centre_height_m, self._to_optical, view.eye, t_s, self._noise
         )
         return tuple(
             [
@@ -170,7 +171,7 @@ def _stepped(
     t_s: float,
 ) -> FloatArray:
     """(N, C) the tracks after a frame with this view at t_s. velocity_mps (N, 2): the true ones."""
-    camera_x, camera_y, cos, sin = view.camera_pose
+    camera_x, camera_y, cos, sin = view.eye
     tracks, dt_s = _predicted(known, draws.errors, velocity_mps, t_s), known.period_s
     last_id = tracks[:, _ID].max() if len(tracks) else 0.0
     for row in range(len(view.bodies)):

@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from config.app import AppConfig, LockstepRunner
 from config.robot import Robot
-from controller import braking
+from controller.decision.camera_limits import CameraLimits
 from controller.path.path import Path
 from hal.compiled import compiled
+from hal.geometry import mount_of
 from hal.types import FloatArray, PlanarPose
 from sim.contact import body_radius, robot_footprints
 from sim.families import Case
@@ -135,19 +136,9 @@ def _runs(time_index: NDArray[np.intp], pose_index: NDArray[np.intp]) -> list[tu
 
 
 def sight_limited_speed_mps(config: AppConfig) -> float:
-    """The top speed that the camera's range allows: an obstacle that comes from beyond it at V_omax must find
-    the robot at rest, with the hardest braking and the minimum latency."""
+    """The top speed that the camera's range allows with the minimum latency."""
     robot, decision = config.robot, config.decision
-    sight_m = decision.sight.range_m + robot.camera_mount.forward_m - robot.body.front_m
-    limits = (
-        braking.emergency(robot.limits) if decision.emergency_caps_range else braking.comfort(robot.limits)
-    )
+    latency_s = 1.0 / config.runner.control_rate_hz + decision.chassis_delay_s
     perception_s = config.runner.perception_latency_s if isinstance(config.runner, LockstepRunner) else 0.0
-    speed = braking.speed_for_distance(
-        sight_m,
-        limits,
-        latency_s=1.0 / config.runner.control_rate_hz + decision.chassis_delay_s + perception_s,
-        closing_mps=robot.limits.max_obstacle_speed_mps,
-        margin_m=decision.margins.least_m,
-    )
-    return min(speed, robot.limits.max_speed_mps)
+    by_camera = CameraLimits(decision, robot, mount_of(robot), latency_s)
+    return min(by_camera.range_mps(perception_s), robot.limits.max_speed_mps)

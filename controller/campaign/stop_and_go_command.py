@@ -28,6 +28,7 @@ from controller.evaluation.report import markdown
 from controller.terminal.outlet import say
 from sim.families.step_in import step_in
 
+# The goals for Nav2's numbers, less what physics needs (docs/results.md).
 TO_STOP_S, HOLD, TO_RESUME_S, FALSE_STOPS = 0.6, 0.95, 0.6, 0.01
 
 

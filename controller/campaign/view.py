@@ -4,13 +4,13 @@ footprints."""
 from __future__ import annotations
 
 import math
-from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from config.camera import SimulatedCameraConfig
 from config.robot import Mount
+from controller.decision.surfaces import Eye
 from hal.compiled import compiled, inlined
 from hal.directions import along_and_left
 from hal.records import record
@@ -20,9 +20,6 @@ from vision.scene import NEVER_M
 
 IntArray = NDArray[np.intp]
 BoolArray = NDArray[np.bool_]
-
-# x_m and y_m of the camera on the floor, and the cosine and sine of where it looks.
-Eye = Annotated[tuple[float, float, float, float], "UniTuple(float64, 4)"]
 
 BANDS = 80  # as many as the scan of perception has at most
 _NEAR_M = 0.1  # nothing nearer than this ahead of the camera is hit, so that no distance is 0
@@ -37,13 +34,13 @@ class PlanarView:
     forward_m: (M, B), forward distance at which each band's ray meets each body; inf if it misses or the body
         is occluded there.
     free_m: (B,), distance of the first body or wall that occludes what is behind it.
-    camera_pose: PlanarCamera.camera_pose().
+    eye: PlanarCamera.eye().
     """
 
     bodies: Integers
     forward_m: Matrix
     free_m: Vector
-    camera_pose: Eye
+    eye: Eye
 
 
 class PlanarCamera:
@@ -95,10 +92,10 @@ class PlanarCamera:
 
     def look(self, polygons: FloatArray, pose: PlanarPose) -> PlanarView:
         """The view from the robot at pose. polygons: (N, K, 2), footprints of all bodies."""
-        camera_pose = self.camera_pose(pose)
-        return PlanarView(*_render(self, polygons, self._room, camera_pose), camera_pose)
+        eye = self.eye(pose)
+        return PlanarView(*_render(self, polygons, self._room, eye), eye)
 
-    def camera_pose(self, pose: PlanarPose) -> Eye:
+    def eye(self, pose: PlanarPose) -> Eye:
         """The camera of a robot at pose."""
         cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
         forward_m, left_m = self._mount.forward_m, self._mount.left_m

@@ -33,19 +33,21 @@ class CameraLimits:
             return [self._range_limit(known.age_s)]
         return [by_condition] if known.fault else [self._range_limit(known.age_s), by_condition]
 
-    def _range_limit(self, age_s: float) -> Limit:
-        """The limit by range: stand before an obstacle arrives from beyond it at V_omax.
+    def range_mps(self, age_s: float) -> float:
+        """The speed that the range allows: stand before an obstacle arrives from beyond it at V_omax.
 
         age_s: age of the newest scene.
         """
-        sees_m = self._sees_m
-        speed = braking.speed_for_distance(
-            sees_m,
+        return braking.speed_for_distance(
+            self._sees_m,
             self._brake,
             latency_s=self._latency_s + age_s,
             closing_mps=self._obstacle_mps,
             margin_m=self._least_m,
         )
+
+    def _range_limit(self, age_s: float) -> Limit:
+        sees_m, speed = self._sees_m, self.range_mps(age_s)
         return Limit(
             speed, lambda: Reason("range", f"the camera sees {sees_m:.1f} m ahead: {allowed_text(speed)}")
         )

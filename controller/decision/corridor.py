@@ -19,6 +19,8 @@ from hal.directions import along_and_left
 from hal.records import record
 from hal.types import FloatArray, Matrix, Vector
 
+# Bodies and surfaces are looked for this much farther along the path than the range of sight.
+BEYOND_RANGE_M = 2.0
 _STEP_M = 0.1
 # The path is searched from this far behind the robot.
 _BEHIND_M = 2.0

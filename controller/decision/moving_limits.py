@@ -105,7 +105,10 @@ class MovingLimits:
     def _conflicts(
         self, watched: Watched, rows: NDArray[np.intp], s_m: float, from_s_m: float, now_s: float
     ) -> list[Conflict]:
-        """The conflicts with the bodies rows that are not behind s_m and begin beyond from_s_m."""
+        """The conflicts with the bodies rows that are not behind s_m and begin beyond from_s_m.
+
+        Notes whose they are, and forgets the choices and times of all others.
+        """
         margins, ids = self._config.margins, watched.bodies.ids
         grazes = np.array([track_id in self._inside for track_id in ids.tolist()])
         beside_m = margins.lateral_m + margins.graze_m * grazes
@@ -168,6 +171,10 @@ class MovingLimits:
     def _offer(
         self, conflict: Conflict, bodies: Bodies, ramps: SpeedRamps, s_m: float, stays: Limit
     ) -> tuple[Choice, Limit]:
+        """The speeds that solve a conflict, and the limit that lets the body pass first.
+
+        stays: the limit if the body does not leave the corridor; it counts where waiting is not worth it.
+        """
         margins, track_id = self._config.margins, int(bodies.ids[conflict.row])
         first = track_id in self._robot_passes_first
         enter_s = margins.crossing_s * (0.5 if first else 1.0) + (0.0 if first else _SWITCH_MARGIN_S)

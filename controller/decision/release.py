@@ -112,8 +112,8 @@ class ReleaseGate:
         elif min_mps > self._held_mps:
             self._raise(min_mps, let_go_mps, now_ns)
         target_mps = self._held_mps
-        hardly = self._wants_gain(v_mps, now_ns) and min(target_mps, max_mps) < v_mps + self._config.worth_mps
-        if hardly or not self._may_turn(now_ns):
+        gains = min(target_mps, max_mps) >= v_mps + self._config.worth_mps
+        if not self._may_turn(now_ns) or (self._wants_gain(v_mps, now_ns) and not gains):
             target_mps = min(target_mps, v_mps)
         self._note_turn(target_mps, v_mps, now_ns)
         return target_mps

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from config.decision import DecisionConfig
 from controller.decision.blind_corners import BlindCorners, SurfacesOnPath
 from controller.decision.bodies import Bodies
-from controller.decision.corridor import Corridor
+from controller.decision.corridor import BEYOND_RANGE_M, Corridor
 from controller.decision.held_surface import SAME_SURFACE_M, HeldSurface
 from controller.decision.surfaces import Surfaces, seen_of
 from controller.decision.view_edges import MIN_TAN, assumed_free_m, may_be_above_view_within_m
@@ -37,8 +37,6 @@ _MAX_ABOVE_M = 3.0
 # Bodies explain a surface that was on no body before if they cover this share of its width.
 _EXPLAINED_SHARE = 0.8
 _BESIDE_MOVER_M = 1.0  # as close to a mover a surface may be a part of it, such as the rest of a vehicle
-# Surfaces are looked for this much farther along the path than the range of sight.
-_BEYOND_RANGE_M = 2.0
 
 
 class Sight:
@@ -131,7 +129,7 @@ class Sight:
 
     def _on_path(self, surfaces: Surfaces, s_m: float) -> SurfacesOnPath:
         """The surfaces in path coordinates, as far as the camera sees from s_m."""
-        to_s_m = s_m + self._sight.range_m + _BEYOND_RANGE_M
+        to_s_m = s_m + self._sight.range_m + BEYOND_RANGE_M
         located = self._corridor.locate(surfaces.points_m, s_m, to_s_m)
         return SurfacesOnPath(surfaces.bands, surfaces.forward_m, *located)
 

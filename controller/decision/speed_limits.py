@@ -30,7 +30,7 @@ from config.robot import Limits
 from controller import braking
 from controller.decision.blind_corners import BlindCorner
 from controller.decision.bodies import Bodies
-from controller.decision.corridor import place
+from controller.decision.corridor import BEYOND_RANGE_M, place
 from controller.decision.decision import Reason
 from controller.decision.lens_cover import COVERED
 from controller.decision.limits import (
@@ -52,7 +52,7 @@ from hal.types import CameraMount
 
 _COARSE_S = 0.5  # step of the times beyond those of the worst case
 # A surface within this distance of a tracked obstacle, along the path, is named after it.
-_SAME_SURFACE_M = 0.8
+_OWNED_WITHIN_M = 0.8
 
 
 class SpeedLimits:
@@ -172,9 +172,9 @@ def _owner(known: WorldModel, surface_s_m: float, s_m: float) -> int | None:
     unboxed = known.unboxed
     if not len(unboxed):
         return None
-    placed = place(unboxed, known.corridor, np.zeros(1), s_m, surface_s_m - s_m + 2.0)
+    placed = place(unboxed, known.corridor, np.zeros(1), s_m, surface_s_m - s_m + BEYOND_RANGE_M)
     near_s = placed.s_m[:, 0] - placed.half_s_m[:, 0]
     far_s = placed.s_m[:, 0] + placed.half_s_m[:, 0]
     off = np.maximum(np.maximum(near_s - surface_s_m, surface_s_m - far_s), 0.0)
     best = int(off.argmin())
-    return int(unboxed.ids[best]) if off[best] < _SAME_SURFACE_M else None
+    return int(unboxed.ids[best]) if off[best] < _OWNED_WITHIN_M else None

@@ -15,7 +15,7 @@ from config.decision import DecisionConfig
 from config.robot import Limits
 from controller import braking
 from controller.decision.bodies import Bodies
-from controller.decision.corridor import Corridor, Placed, place
+from controller.decision.corridor import BEYOND_RANGE_M, Corridor, Placed, place
 from controller.decision.limits import (
     ALONGSIDE_M,
     STANDING_MPS,
@@ -133,8 +133,8 @@ class StandingLimits:
         if np.count_nonzero(bodies.moving) == len(bodies):
             return
         sight, margins = self._config.sight, self._config.margins
-        placed = place(bodies, known.corridor, _NOW, s_m, sight.range_m + 2.0)
-        clearance_m = self._clear(known, placed, s_m, before)
+        placed = place(bodies, known.corridor, _NOW, s_m, sight.range_m + BEYOND_RANGE_M)
+        clearance_m = self._clearances(known, placed, s_m, before)
         near = _stands_within(bodies.moving, clearance_m, -math.inf, margins.lateral_m + margins.graze_m)
         if self._inside:
             self._inside.difference_update(bodies.ids[~(near | bodies.moving)].tolist())
@@ -147,8 +147,10 @@ class StandingLimits:
         for gone in self._clear_since_s.keys() - {near.track_id for near in self._near}:
             del self._clear_since_s[gone]
 
-    def _clear(self, known: WorldModel, placed: Placed, s_m: float, before: dict[int, float]) -> FloatArray:
-        """(N,) free floor between the bodies and the corridor.
+    def _clearances(
+        self, known: WorldModel, placed: Placed, s_m: float, before: dict[int, float]
+    ) -> FloatArray:
+        """(N,) free floor between the bodies and the corridor; notes the outlines that it measures.
 
         In bends it comes from each body's outline when it was last seen whole, unless a part that is nearer
         to the corridor is seen now. On a straight path the box fits, but mixed pixels at its edges make it

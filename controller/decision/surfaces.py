@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from hal.types import CameraMount, FloatArray, PlanarPose
 from vision.scene import FreeSpace
 
 # x_m and y_m of the camera on the floor, and the cosine and sine of where it looks.
-Eye = tuple[float, float, float, float]
+Eye = Annotated[tuple[float, float, float, float], "UniTuple(float64, 4)"]
 
 # A point this near to an obstacle's box is part of it: swinging limbs, a box that lags a little.
 AROUND_M = 0.3

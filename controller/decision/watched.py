@@ -11,7 +11,13 @@ from numpy.typing import NDArray
 
 from config.decision import DecisionConfig
 from controller.decision.bodies import Bodies, no_bodies
-from controller.decision.corridor import PathVelocities, Placed, path_velocities, place
+from controller.decision.corridor import (
+    BEYOND_RANGE_M,
+    PathVelocities,
+    Placed,
+    path_velocities,
+    place,
+)
 from controller.decision.crossing import likely_enters
 from controller.decision.debounce import Debounced
 from controller.decision.limits import UNSEEN_ERROR_SIGMAS
@@ -22,7 +28,6 @@ from hal.types import FloatArray
 # A body must head for the corridor for this long until it counts as coming in, and head elsewhere for as long
 # until it does not. Meanwhile the worst case covers it.
 _DEBOUNCE_S = 0.3
-_BEYOND_RANGE_M = 2.0  # bodies are placed along the path up to this far beyond the camera's range
 _NO_FLAGS = np.zeros(0, np.bool_)
 
 
@@ -70,7 +75,7 @@ class Watch:
         if not len(bodies):
             self._enters.pause()
             return None
-        range_m = self._config.sight.range_m + _BEYOND_RANGE_M
+        range_m = self._config.sight.range_m + BEYOND_RANGE_M
         placed = place(bodies, known.corridor, known.since_s + self._times_s, s_m, range_m)
         velocities = path_velocities(bodies, placed.heading_rad[:, 0])
         sigma_left_mps = velocities.sigma_left_mps * self._config.prediction.sigmas

@@ -10,7 +10,7 @@ from collections import deque
 from config.robot import Robot
 from controller.decision.decide import DecisionMaker
 from controller.decision.world_model import WorldModel
-from controller.governor.arcs import arc_path
+from controller.governor.arcs import SAME_MPS, arc_path
 from controller.path.path import OnPath, Path
 from hal.types import PlanarPose
 from vision.scene import Scene
@@ -20,8 +20,6 @@ from vision.scene import Scene
 _OFF_M = 0.02
 _OFF_RAD = 0.02
 _ALONG_M = 0.25
-# Speeds that differ by less count as equal.
-_SAME_MPS = 1e-3
 # Curvatures that differ by no more than this count as equal: it displaces the arc by 10 cm at the end of the
 # camera's range, and by 1 cm where the robot may have to stop.
 _SAME_1PM = 0.002
@@ -72,7 +70,7 @@ class ArcAhead:
             self.on_path = on = self.path.project(pose, self.on_path.s_m)
             fits = abs(on.d_m) <= _OFF_M and abs(on.heading_rad) <= _OFF_RAD and on.s_m <= _ALONG_M
             bends = abs(wanted[0] - self._laid_out[0]) <= _SAME_1PM
-            if fits and bends and abs(wanted[1] - self._laid_out[1]) < _SAME_MPS:
+            if fits and bends and abs(wanted[1] - self._laid_out[1]) < SAME_MPS:
                 return self.path
         path = arc_path(pose, curvature_1pm, speed_mps, self._range_m, self._robot)
         known = self._look_again(path, v_mps)

@@ -21,6 +21,7 @@ _SPARE_RADIUS = 1.01
 # Slower requests count as standing: they are rounding errors of the planner or noise of encoders.
 REQUESTED_REST_MPS = 0.005
 REQUESTED_REST_RADPS = 0.005
+SAME_MPS = 1e-3  # requested speeds that differ by less count as equal
 # An arc with a radius of more than 10 km becomes a straight line (config.path.ArcSpec allows no larger one).
 _STRAIGHT_1PM = 1e-4
 # The path follows the arc for at most this angle, nearly half a turn.

@@ -25,7 +25,15 @@ from controller.decision.obstacle_boxes import bodies_of
 from controller.decision.situation import SceneError, Situation
 from controller.decision.surfaces import check_scan
 from controller.governor.arc_ahead import ArcAhead
-from controller.governor.arcs import Kind, MotionRequest, corner_m, driveable, stop_reason_of, understand
+from controller.governor.arcs import (
+    SAME_MPS,
+    Kind,
+    MotionRequest,
+    corner_m,
+    driveable,
+    stop_reason_of,
+    understand,
+)
 from controller.governor.ground import GroundMemory
 from controller.governor.ground_limits import GroundLimits
 from controller.governor.request import Twist
@@ -36,7 +44,6 @@ from vision.scene import CameraCondition, Scene
 
 # The remembered floor stands in for the camera up to this far beyond the floor that is free by consent.
 _NEAR_EXTRA_M = 0.3
-_SAME_MPS = 1e-3  # speeds that differ by less count as equal
 
 
 @dataclass(frozen=True, slots=True)
@@ -241,7 +248,7 @@ class SpeedGovernor:
             reason = Reason(
                 "requested", f"as asked: {requested.v_mps:.2f} m/s, {requested.w_radps:.2f} rad/s"
             )
-            if target_mps < requested.v_mps - _SAME_MPS:
+            if target_mps < requested.v_mps - SAME_MPS:
                 sentence = (
                     f"asked {requested.v_mps:.2f} m/s; on this arc the robot drives {target_mps:.2f} m/s"
                 )
