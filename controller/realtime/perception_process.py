@@ -5,6 +5,7 @@ It sends scenes to the control process (controller/realtime/runner.py) and gets 
 
 from __future__ import annotations
 
+import math
 import socket
 import time
 from contextlib import suppress
@@ -110,7 +111,7 @@ class RemoteBody:
         assert self._newest is not None
         ahead_ns = stamp_ns - from_ns
         state = self._newest.chassis
-        twist_known = state.v_mps == state.v_mps and state.w_radps == state.w_radps
+        twist_known = math.isfinite(state.v_mps + state.w_radps)
         if not 0 <= ahead_ns <= REACH_S * NS_PER_S or not (twist_known and pose.finite):
             return None
         return advance_pose(pose, state.v_mps, state.w_radps, ahead_ns / NS_PER_S)

@@ -183,6 +183,27 @@ class ConditionTally:
 
 
 @dataclass
+class ObstacleTally:
+    """Which obstacles were seen, by id, and how near the nearest came ahead of the camera."""
+
+    seen: set[int] = field(default_factory=set)
+    moving: set[int] = field(default_factory=set)
+    nearest_m: float = math.inf
+
+    def add(self, track_id: int, moving: bool, ahead_m: float) -> None:
+        """Add an obstacle of one frame. ahead_m: of the camera."""
+        self.seen.add(track_id)
+        if moving:
+            self.moving.add(track_id)
+        self.nearest_m = min(self.nearest_m, ahead_m)
+
+    def line(self) -> str:
+        """For the summary."""
+        text = f"{len(self.seen)} seen, {len(self.moving)} of them moving"
+        return text + (f"; nearest {self.nearest_m:.2f} m ahead" if math.isfinite(self.nearest_m) else "")
+
+
+@dataclass
 class FrameTally:
     """How many of the frames that the camera counted were processed."""
 

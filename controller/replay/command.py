@@ -25,7 +25,7 @@ from controller.path.path import OnPath, Path
 from controller.perceive import Look
 from controller.record.observations import STANDARD_OUTPUT
 from controller.record.recorder import STRAIGHT_AHEAD_M, RecordingOptions, open_recorder, require_two_files
-from controller.record.tally import ConditionTally, TimingTally
+from controller.record.tally import ConditionTally, ObstacleTally, TimingTally
 from controller.replay.build import build_replay_decision, build_replay_perceiver, replay_video_settings
 from controller.terminal.console import Console
 from hal.cameras.bag_topics import WantedTopics
@@ -65,9 +65,7 @@ class ReplayTally:
     without_pose: int = 0
     first_ns: int = 0
     last_ns: int = 0
-    ids: set[int] = field(default_factory=set)
-    moving_ids: set[int] = field(default_factory=set)
-    nearest_m: float = math.inf
+    seen: ObstacleTally = field(default_factory=ObstacleTally)
     camera: ConditionTally = field(default_factory=ConditionTally)
     actions: Counter[str] = field(default_factory=Counter)
 
@@ -78,10 +76,8 @@ class ReplayTally:
         self.last_ns = look.scene.captured_ns
         self.frames += 1
         self.without_pose += look.camera_pose is None
-        self.ids.update(obstacle.id for obstacle in look.scene.obstacles)
-        self.moving_ids.update(obstacle.id for obstacle in look.scene.obstacles if obstacle.moving)
         for obstacle in look.scene.obstacles:
-            self.nearest_m = min(self.nearest_m, float(obstacle.position_m[2]))
+            self.seen.add(obstacle.id, obstacle.moving, float(obstacle.position_m[2]))
         self.camera.add(look.scene.health)
         self.actions[decision.action.value] += 1
 
@@ -206,11 +202,7 @@ def _summary(
             f"{options.recording}: {tally.frames} frames, {duration_s:.2f} s; {len(skipped)} skipped",
         ),
         ("odometry", odometry),
-        (
-            "obstacles",
-            f"{len(tally.ids)} seen, {len(tally.moving_ids)} of them moving"
-            + (f"; nearest {tally.nearest_m:.2f} m ahead" if math.isfinite(tally.nearest_m) else ""),
-        ),
+        ("obstacles", tally.seen.line()),
         ("decisions", f"{_counts(tally)}; for a robot that drives straight ahead"),
         ("camera", tally.camera.line()),
         ("perception", tally.timing.line()),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -11,7 +10,7 @@ import numpy as np
 
 from controller.control import ControlStep
 from controller.realtime.messages import SceneMessage
-from controller.record.tally import Complaints, ConditionTally, FrameTally, TimingTally
+from controller.record.tally import Complaints, ConditionTally, FrameTally, ObstacleTally, TimingTally
 from hal.clocks import NS_PER_S
 from hal.geometry import camera_in_body, wrap_angle_rad
 from hal.types import CameraMount, PlanarPose
@@ -69,9 +68,7 @@ class WatchResult:
     first_ns: int | None = None
     last: ControlStep | None = None
     last_scene: Scene | None = None
-    ids: set[int] = field(default_factory=set)
-    moving_ids: set[int] = field(default_factory=set)
-    nearest_m: float = math.inf
+    seen: ObstacleTally = field(default_factory=ObstacleTally)
     odometry_turn_rad: float = 0.0
     turned_rad: float = 0.0
     _looks: deque[SeenFloor] = field(default_factory=lambda: deque(maxlen=_MOST_LOOKS))
@@ -106,10 +103,8 @@ class WatchResult:
         self.timing.add(message.timing_ms)
         self.frames.add(scene.sequence)
         self.camera.add(scene.health)
-        self.ids.update(obstacle.id for obstacle in scene.obstacles)
-        self.moving_ids.update(obstacle.id for obstacle in scene.obstacles if obstacle.moving)
-        for seen in self.obstacles():
-            self.nearest_m = min(self.nearest_m, seen.ahead_m)
+        for obstacle in self.obstacles():
+            self.seen.add(obstacle.id, obstacle.moving, obstacle.ahead_m)
         look = scene.floor
         if look is not None and not (self._looks and self._looks[-1].captured_ns == look.captured_ns):
             self._looks.append(look)

@@ -18,7 +18,7 @@ def summary_rows(config: AppConfig, loop: WatchLoop, result: WatchResult) -> lis
     rows = [("watched", f"{result.duration_s:.1f} s ({loop.reason}); nothing was commanded")]
     if result.frames.processed:
         rows += [("camera", result.camera.line()), ("floor", _floor_text(config, result))]
-        rows.append(("obstacles", _obstacles_text(result)))
+        rows.append(("obstacles", result.seen.line()))
     if result.last is not None:
         state = result.last.chassis
         rows.append(("base", base_text(state)))
@@ -39,11 +39,6 @@ def _floor_text(config: AppConfig, result: WatchResult) -> str:
     floor = result.floor_in_all()
     looks = "" if floor is None else f"; median of {floor.looks} looks"
     return floor_text(floor, config.robot.camera_mount) + looks
-
-
-def _obstacles_text(result: WatchResult) -> str:
-    text = f"{len(result.ids)} seen, {len(result.moving_ids)} of them moving"
-    return text + (f"; nearest {result.nearest_m:.2f} m ahead" if math.isfinite(result.nearest_m) else "")
 
 
 def turns_text(result: WatchResult, yaw_ratio: float, slip_factor: float) -> str:
