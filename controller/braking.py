@@ -18,7 +18,7 @@ from config.robot import Limits
 from hal.compiled import compiled, inlined
 from hal.records import record
 
-_NEWTON_STEPS = 60
+_ROUNDS = 60  # of Newton's method, or of bisection: a double has no more bits
 _CONVERGED = 1e-14
 
 
@@ -219,7 +219,7 @@ def _solve_from_steady(
     root_j = math.sqrt(j)
     low, high = 0.0, big_a / root_j
     x = high
-    for _ in range(_NEWTON_STEPS):
+    for _ in range(_ROUNDS):
         value = ((x / root_j + linear_s) * x + 2.0 * towards_mps / root_j) * x + constant_m
         slope = (3.0 * x / root_j + 2.0 * linear_s) * x + 2.0 * towards_mps / root_j
         low, high = (low, x) if value > 0.0 else (x, high)
@@ -239,7 +239,7 @@ def _bisect_speed(
     # high is an upper bound of the speed: easing the acceleration off sheds a^2 / J at most, and a stop from
     # the rest takes v^2 / 2A, more than free_m. free_m is negative only by rounding.
     low, high = 0.0, math.sqrt(2.0 * big_a * max(free_m, 0.0)) + abs(a_mps2) + a_mps2**2 / j
-    for _ in range(_NEWTON_STEPS):
+    for _ in range(_ROUNDS):
         middle = 0.5 * (low + high)
         if _required(middle, a_mps2, towards_mps, latency_s, big_a, j) <= free_m:
             low = middle
@@ -291,7 +291,7 @@ def _speed_for(
 @compiled("float64, float64, float64, float64")
 def _before_section(distance_m: float, section_mps: float, big_a: float, j: float) -> float:
     low, high = section_mps, section_mps + math.sqrt(2.0 * big_a * distance_m)
-    for _ in range(_NEWTON_STEPS):
+    for _ in range(_ROUNDS):
         middle = 0.5 * (low + high)
         if _slowing(middle, section_mps, big_a, j) <= distance_m:
             low = middle

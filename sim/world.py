@@ -18,7 +18,7 @@ from sim.models.mesh import Faces, join, normals
 from sim.models.outlines import footprint, heights
 from sim.motion import MotionState, Trajectory
 
-BUILDING_ID = 0
+BUILDING_ID = 0  # its value in instance masks; the bodies count from 1
 
 
 @dataclass(frozen=True, slots=True, eq=False)

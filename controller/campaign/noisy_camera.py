@@ -30,7 +30,7 @@ from hal.geometry import camera_in_body, mount_of
 from hal.types import FloatArray, PlanarPose, Pose
 from vision.scene import CameraCondition, CameraHealth, EgoMotion, FreeSpace, Scene
 
-_GOOD = CameraHealth(CameraCondition.GOOD, "", 0.95)
+_GOOD = CameraHealth(CameraCondition.GOOD, "", 0.95)  # depth is valid in most of the image
 
 
 class NoisyCamera:

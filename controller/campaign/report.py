@@ -20,7 +20,7 @@ from controller.campaign.summary import Summary, Totals, summarise
 from controller.errors import UserError
 from controller.evaluation.report import markdown
 
-_MAX_FAILED_ROWS = 40
+_MAX_FAILED_ROWS = 40  # that are listed in the report; missions.jsonl has all
 
 
 def write_report(

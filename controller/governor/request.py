@@ -14,7 +14,7 @@ from typing import NoReturn
 
 from controller.decision.decision import Decision
 
-MOST_BYTES = 512
+MOST_BYTES = 512  # a request has some 80
 # Requests above these are rejected as mistakes; nothing that drives on a floor is faster.
 MOST_MPS = 10.0
 MOST_RADPS = 10.0

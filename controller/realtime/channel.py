@@ -10,7 +10,7 @@ import pickle
 import socket
 from contextlib import suppress
 
-BUFFER_BYTES = 1 << 20
+BUFFER_BYTES = 1 << 20  # of the socket, and so the greatest message
 
 
 class PeerGone(Exception):

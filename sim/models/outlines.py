@@ -22,7 +22,7 @@ from hal.types import FloatArray
 from sim.models.person import swing
 from sim.models.vehicle import SENSOR_HEIGHT_M
 
-POLE_SIDES = 8
+POLE_SIDES = 8  # of the prism that stands for a pole
 
 
 def footprint(spec: BodySpec, speed_mps: float) -> FloatArray:

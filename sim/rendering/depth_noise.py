@@ -16,7 +16,7 @@ from config.camera import SimulatedCameraConfig
 from hal.types import DepthImage, Intrinsics
 from sim.rendering.raster import Float32Image
 
-DEPTH_SCALE_M = 0.001
+DEPTH_SCALE_M = 0.001  # depth in millimetres, as from a RealSense
 
 # Standard deviation of inverse depth: sigma_z = z^2 * this.
 SIGMA_PER_M: dict[str, float] = {"realsense": 0.0075, "paper": 0.0005, "none": 0.0}

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from hal.types import FloatArray, Intrinsics
 
-NEAR_M = 0.05
+NEAR_M = 0.05  # nothing nearer than this ahead of the camera is drawn
 
 
 @dataclass(frozen=True, slots=True, eq=False)
