@@ -50,7 +50,7 @@ class Moment:
 
 
 def run_lockstep(
-    config: LockstepRunner,
+    runner: LockstepRunner,
     clock: Clock,
     outside: Outside,
     camera: ScheduledCamera,
@@ -63,10 +63,10 @@ def run_lockstep(
     late_by: for the exposure time of a scene, in seconds, by how many seconds it is late in addition to
     perception_latency_s. Scenes do not overtake each other.
     """
-    period_ns = round(NS_PER_S / config.control_rate_hz)
-    latency_ns = round(config.perception_latency_s * NS_PER_S)
+    period_ns = round(NS_PER_S / runner.control_rate_hz)
+    latency_ns = round(runner.perception_latency_s * NS_PER_S)
     control_ns = clock.now_ns()
-    give_up_ns = control_ns + round(config.max_duration_s * NS_PER_S)
+    give_up_ns = control_ns + round(runner.max_duration_s * NS_PER_S)
     on_its_way: deque[tuple[int, Scene]] = deque()
     known: Scene | None = None
     looks: list[Look] = []

@@ -11,6 +11,7 @@ from config.loader import ConfigError
 from config.scenario import Scenario, as_yaml, load_scenario
 from controller.errors import UserError
 from controller.mission.close_by import close_by_warning
+from controller.mission.options import scenario_as_typed
 from controller.mission.possible_world import require_possible_world
 from controller.mission.short_arcs import short_arc_warning
 from controller.terminal.outlet import say
@@ -57,8 +58,7 @@ def load_own(given: Sequence[str], config: AppConfig) -> dict[str, OwnScenario]:
 
 def _in_this_world(config: AppConfig, given: str) -> AppConfig:
     assert config.simulation is not None, "AppConfig asks for one with a simulated camera"
-    scenario = str(Path(given).absolute()) if Path(given).suffix in {".yaml", ".yml"} else given
-    changed = config.simulation.model_copy(update={"scenario": scenario})
+    changed = config.simulation.model_copy(update={"scenario": scenario_as_typed(given)})
     return config.model_copy(update={"simulation": changed})
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from config.app import AppConfig, RealtimeRunner, load_app
+from config.app import AppConfig, RealtimeRunner
 from config.governor import GovernorConfig, InputConfig, UdpInputConfig
 from controller.base.drive_lifecycle import Outcome
 from controller.build import open_commands
@@ -13,11 +13,11 @@ from controller.errors import UserError
 from controller.governor.build import build_governor_loop
 from controller.governor.inbox import Inbox
 from controller.governor.loop import GovernorLoop
-from controller.mission.command import with_overrides
+from controller.mission.command import load_for_drive
 from controller.mission.options import MissionOptions
 from controller.mission.possible_world import require_possible_world
 from controller.mission.result import DriveResult
-from controller.mission.scenario_faults import unused_faults_warning, with_scenario_faults
+from controller.mission.scenario_faults import unused_faults_warning
 from controller.realtime.rig import realtime_rig
 from controller.realtime.service import ServiceManager
 from controller.record.observations import STANDARD_OUTPUT
@@ -44,8 +44,7 @@ def run_governor(options: MissionOptions) -> int:
 
     Raises ConfigError, HalError, UserError.
     """
-    config = with_overrides(load_app(options.config_path), options)
-    config = with_scenario_faults(config)
+    config = load_for_drive(options)
     if config.governor is None:
         raise UserError(f"{options.config_path}: has no 'governor' section; add one (docs/governor.md)")
     assert isinstance(config.runner, RealtimeRunner), "a governor in lock-step is refused by AppConfig"

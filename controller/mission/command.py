@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from contextlib import ExitStack
-from pathlib import Path as FilePath
 
 from config.app import AppConfig, LockstepRunner, load_app
 from controller.base.drive_lifecycle import Outcome
@@ -22,7 +21,7 @@ from controller.errors import UserError
 from controller.lockstep import run_lockstep
 from controller.mission.blind_bends import blind_bend_warning
 from controller.mission.close_by import close_by_warning
-from controller.mission.options import MissionOptions
+from controller.mission.options import MissionOptions, scenario_as_typed
 from controller.mission.possible_world import require_possible_world
 from controller.mission.result import MissionResult
 from controller.mission.scenario_faults import unused_faults_warning, with_scenario_faults
@@ -42,8 +41,7 @@ def run_mission(options: MissionOptions) -> int:
 
     Raises ConfigError, HalError, UserError.
     """
-    config = with_overrides(load_app(options.config_path), options)
-    config = with_scenario_faults(config)
+    config = load_for_drive(options)
     if config.governor is not None:
         raise UserError(
             f"{options.config_path}: has a 'governor' and no path to drive; use `treadwatch govern`"
@@ -62,11 +60,19 @@ def run_mission(options: MissionOptions) -> int:
     return 0 if result.succeeded else 1
 
 
+def load_for_drive(options: MissionOptions) -> AppConfig:
+    """The configuration of a drive: of the file, with what the command line and the scenario change in it.
+
+    Raises ConfigError, UserError.
+    """
+    return with_scenario_faults(with_overrides(load_app(options.config_path), options))
+
+
 def with_overrides(config: AppConfig, options: MissionOptions) -> AppConfig:
     """The configuration with another scenario or seed. Raises UserError where nothing is simulated."""
     changes: dict[str, object] = {}
     if options.scenario is not None:
-        changes["scenario"] = _as_typed(options.scenario)
+        changes["scenario"] = scenario_as_typed(options.scenario)
     if options.seed is not None:
         changes["seed"] = options.seed
     if not changes:
@@ -76,11 +82,6 @@ def with_overrides(config: AppConfig, options: MissionOptions) -> AppConfig:
             f"--{' and --'.join(changes)}: {options.config_path} simulates nothing; leave the option out"
         )
     return config.model_copy(update={"simulation": config.simulation.model_copy(update=changes)})
-
-
-def _as_typed(scenario: str) -> str:
-    """A file on the command line is relative to the working directory (in a YAML, to that YAML)."""
-    return str(FilePath.cwd() / scenario) if scenario.endswith((".yaml", ".yml")) else scenario
 
 
 def drive_lockstep(

@@ -23,3 +23,8 @@ class MissionOptions:
     def recording(self, *, timed: bool = True) -> RecordingOptions:
         """The files to write. timed: see there."""
         return RecordingOptions(self.observations, self.video, self.record, timed)
+
+
+def scenario_as_typed(scenario: str) -> str:
+    """A file on the command line is relative to the working directory (in a YAML, to that YAML)."""
+    return str(Path.cwd() / scenario) if scenario.endswith((".yaml", ".yml")) else scenario

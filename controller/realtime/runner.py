@@ -57,7 +57,7 @@ class RealtimeMoment:
 
 
 def run_realtime(
-    config: RealtimeRunner,
+    runner: RealtimeRunner,
     clock: Clock,
     outside: SimulatedWorld | None,
     perception: PerceptionLink,
@@ -70,7 +70,7 @@ def run_realtime(
     After an overrun, periods are skipped and the phase is kept, so that late commands are not sent in a
     burst. A step that would begin half a period late or more is left out.
     """
-    period_ns = round(NS_PER_S / config.control_rate_hz)
+    period_ns = round(NS_PER_S / runner.control_rate_hz)
     started_ns = deadline_ns = clock.now_ns()
     while not loop.finished:
         clock.sleep_until_ns(deadline_ns)
@@ -82,8 +82,8 @@ def run_realtime(
             loop.request_stop(f"{stop.reason} received")
         elif perception.lost_reason is not None:
             loop.request_stop(f"perception is lost: {perception.lost_reason}", Outcome.BROKEN_OFF)
-        elif config.max_duration_s is not None and now_ns - started_ns > config.max_duration_s * NS_PER_S:
-            loop.request_stop(f"max_duration_s of {config.max_duration_s:g} s is over", Outcome.BROKEN_OFF)
+        elif runner.max_duration_s is not None and now_ns - started_ns > runner.max_duration_s * NS_PER_S:
+            loop.request_stop(f"max_duration_s of {runner.max_duration_s:g} s is over", Outcome.BROKEN_OFF)
         if outside is not None:
             outside.advance_to(now_ns)
         step = loop.step(None if perception.newest is None else perception.newest.scene, now_ns)

@@ -6,7 +6,7 @@ import os
 from contextlib import ExitStack
 from dataclasses import dataclass
 
-from config.app import AppConfig, LockstepRunner, RealtimeRunner, load_app
+from config.app import AppConfig, LockstepRunner, RealtimeRunner
 from controller.base.drive_lifecycle import Outcome
 from controller.base.ego_speed import EgoSpeed
 from controller.base.localise import Localiser
@@ -19,9 +19,8 @@ from controller.build import (
 )
 from controller.build_chassis import build_listener
 from controller.errors import UserError
-from controller.mission.command import with_overrides
+from controller.mission.command import load_for_drive
 from controller.mission.options import MissionOptions
-from controller.mission.scenario_faults import with_scenario_faults
 from controller.realtime.messages import STREAM_ENDED
 from controller.realtime.rig import HEAD_START_S, perception_beside, warn_of_cut_off
 from controller.realtime.runner import Punctuality, run_realtime
@@ -60,8 +59,7 @@ def run_watch(options: WatchOptions) -> int:
     Raises ConfigError, HalError, UserError.
     """
     given = options.mission
-    config = with_overrides(load_app(given.config_path), given)
-    config = with_scenario_faults(config)
+    config = load_for_drive(given)
     if isinstance(config.runner, LockstepRunner):
         raise UserError(
             f"{given.config_path}: runner.kind 'lockstep' is simulated time, and watching happens in real "
