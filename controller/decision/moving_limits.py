@@ -30,6 +30,7 @@ from controller.decision.limits import (
 )
 from controller.decision.watched import Watched
 from controller.profile import SpeedRamps, ramps_from
+from hal.records import record
 from hal.types import FloatArray
 
 _SPEEDS = 31  # how many speeds are tried
@@ -46,6 +47,15 @@ _LEAVE_TIME_WEIGHT = 0.2  # weight of the newest estimate in the average of a ti
 _WAIT_FOR_PASSING_S = 2.0
 # Hysteresis: choosing to pass before a body needs this much more time than keeping that choice.
 _SWITCH_MARGIN_S = 0.5
+
+
+@record(frozen=True, slots=True, eq=False)
+class _Offer:
+    """What may be done about one body: the speeds that solve its conflict, and the limit if it goes first."""
+
+    track_id: int
+    choice: Choice
+    limit: Limit
 
 
 class MovingLimits:
@@ -85,8 +95,8 @@ class MovingLimits:
         offers = []
         for one in conflicts:
             stays = self._when_it_stays(one, watched, s_m, motion)
-            offers.append((one, *self._offer(one, watched.bodies, ramps, s_m, stays)))
-        return self._settle(offers, watched.bodies, base_mps)
+            offers.append(self._offer(one, watched.bodies, ramps, s_m, stays))
+        return self._settle(offers, base_mps)
 
     def _in_the_way(self, watched: Watched, s_m: float, standing: bool) -> NDArray[np.intp]:
         """(R,) rows of the moving bodies ahead that enter.
@@ -170,8 +180,8 @@ class MovingLimits:
 
     def _offer(
         self, conflict: Conflict, bodies: Bodies, ramps: SpeedRamps, s_m: float, stays: Limit
-    ) -> tuple[Choice, Limit]:
-        """The speeds that solve a conflict, and the limit that lets the body pass first.
+    ) -> _Offer:
+        """The offer for one conflict.
 
         stays: the limit if the body does not leave the corridor; it counts where waiting is not worth it.
         """
@@ -183,7 +193,7 @@ class MovingLimits:
             choice = Choice(choice.yield_mps, math.inf)
         worth_mps = _MIN_ARRIVAL_MPS if conflict.out_s <= _MAX_FORESEEN_LEAVE_S else math.inf
         if choice.yield_mps < min(stays.speed_mps, worth_mps):
-            return Choice(stays.speed_mps, choice.first_mps), stays
+            return _Offer(track_id, Choice(stays.speed_mps, choice.first_mps), stays)
 
         def why() -> Reason:
             ahead_m, waits = conflict.lo_in_m - s_m, stays.reason
@@ -196,11 +206,9 @@ class MovingLimits:
                 "crossing", sentence, track_id, ahead_m, waits.closing_mps, waits.required_m, waits.margin_m
             )
 
-        return choice, Limit(choice.yield_mps, why)
+        return _Offer(track_id, choice, Limit(choice.yield_mps, why))
 
-    def _settle(
-        self, offers: list[tuple[Conflict, Choice, Limit]], bodies: Bodies, base_mps: float
-    ) -> tuple[list[Limit], float]:
+    def _settle(self, offers: list[_Offer], base_mps: float) -> tuple[list[Limit], float]:
         """The limits that apply, and the greatest speed up to base_mps that solves every conflict.
 
         At that speed the robot passes each body either before it or after it. Which bodies it passes before
@@ -209,17 +217,16 @@ class MovingLimits:
         speed, found = base_mps, []
         waiting = list(offers)
         while waiting:
-            blocked = [one for one in waiting if one[1].yield_mps < speed < one[1].first_mps]
+            blocked = [one for one in waiting if one.choice.yield_mps < speed < one.choice.first_mps]
             if not blocked:
                 break
-            worst = min(blocked, key=lambda one: one[1].yield_mps)
-            speed = worst[1].yield_mps
-            found.append(worst[2])
+            worst = min(blocked, key=lambda one: one.choice.yield_mps)
+            speed = worst.choice.yield_mps
+            found.append(worst.limit)
             waiting.remove(worst)
-        for conflict, choice, _ in offers:
-            track_id = int(bodies.ids[conflict.row])
-            if choice.yield_mps < speed and speed >= choice.first_mps:
-                self._robot_passes_first.add(track_id)
+        for one in offers:
+            if one.choice.yield_mps < speed and speed >= one.choice.first_mps:
+                self._robot_passes_first.add(one.track_id)
             else:
-                self._robot_passes_first.discard(track_id)
+                self._robot_passes_first.discard(one.track_id)
         return found, speed
