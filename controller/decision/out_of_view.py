@@ -17,6 +17,8 @@ body of the last scene that is missing in this one is kept while its place is no
   6 s apply. A body that clearly approached may first be some decimetres late.
 * Moving, and another body is seen where it was expected: dropped only if the other one has been seen for more
   than 0.5 s and its velocity agrees within 2 sigma. Else both count: they may be two people.
+* Seen for 0.5 s at most, and gone where a mover is seen: dropped at once, it was a part of that mover. What
+  comes in over the edge of the view is often seen in pieces first.
 * A narrow strip within 0.5 m of a mover that is kept and was seen for longer, with the same velocity within 2
   sigma: dropped, it was the last visible part of that mover (controller/decision/leftover_strips.py). It was
   seen to move for less than 0.5 s, or is judged standing, but was measured as moving, for 0.5 to 1 s.
@@ -172,6 +174,7 @@ class OutOfView:
             return bodies, since_s
         gone = with_measured_velocity(before.select(missing), self._mistaken_mps)
         gone = gone.select(gone.moving | ((gone.age_s >= MIN_TRACKED_S) & (not standing)))
+        gone = gone.select(~_parts_of_movers(gone, seen))
         return bodies.joined(gone), np.concatenate((since_s, np.full(len(gone), dt_s)))
 
     def _still_there(
@@ -201,6 +204,22 @@ def _missing(ids: IntArray, seen_ids: IntArray) -> BoolArray:
     for k in range(len(ids)):
         missing[k] = not (seen_ids == ids[k]).any()
     return missing
+
+
+@compiled(Bodies, Bodies)
+def _parts_of_movers(gone: Bodies, seen: Bodies) -> BoolArray:
+    """(N,) which of the bodies that have just gone were parts of movers that are seen.
+
+    They were seen for MIN_TRACKED_S at most, so that their velocity is hardly known, and a mover is seen
+    where they were.
+    """
+    parts = np.zeros(len(gone.ids), np.bool_)
+    covered = covering(seen, gone.xy_m, gone.half_view_m, _SAME_PLACE_M)
+    for k in range(len(parts)):
+        for m in range(len(seen.ids)):
+            if gone.tracked_s[k] <= MIN_TRACKED_S and seen.moving[m] and covered[k, m]:
+                parts[k] = True
+    return parts
 
 
 @compiled(Bodies, "float64[:]", Bodies, "boolean[:]", PlanarPose)

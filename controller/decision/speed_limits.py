@@ -53,6 +53,9 @@ from hal.types import CameraMount
 _COARSE_S = 0.5  # step of the times beyond those of the worst case
 # A surface within this distance of a tracked obstacle, along the path, is named after it.
 _OWNED_WITHIN_M = 0.8
+# A surface this far behind the robot's front is in a place where only the robot itself can be.
+_INSIDE_M = 0.05
+_INSIDE = "a surface is inside the robot's outline: stop; is a part of the robot in view?"
 
 
 class SpeedLimits:
@@ -127,7 +130,8 @@ class SpeedLimits:
         def why() -> Reason:
             owned = replace(gap, obstacle_id=_owner(known, surface_s_m, s_m))
             what = standing_text(known.sight.surface_clearance_m, margins.lateral_m)
-            return reason_before(owned, room, "depth", what)
+            reason = reason_before(owned, room, "depth", what)
+            return replace(reason, sentence=_INSIDE) if gap.distance_m < -_INSIDE_M else reason
 
         return Limit(room.speed_mps, why, too_little_left(room, motion, margins.stop_m, margins.least_m))
 

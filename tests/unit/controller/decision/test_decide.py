@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from config.decision import DecisionConfig
+from config.robot import Robot
 from controller.decision.decision import Action
 from tests.support.decision_bench import Bench, obstacle
 from tests.support.scenes import free_space
@@ -69,6 +70,22 @@ def test_a_plain_wall_stops_by_depth_alone() -> None:
     assert decision.reason.rule == "depth"
     assert decision.reason.obstacle_id is None
     assert decision.reason.distance_m == pytest.approx(2.5 + 0.45 - 0.51)
+
+
+@pytest.mark.parametrize(
+    ("nearest_m", "told"),
+    [
+        (0.56, "a surface is inside the robot's outline: stop; is a part of the robot in view?"),
+        (0.64, "a surface stands on the path 0.0 m ahead: stop"),
+    ],
+)
+def test_a_surface_behind_the_robots_front_is_told_as_a_part_of_it(nearest_m: float, told: str) -> None:
+    """The camera is 0.45 m ahead of the turning centre, the front 1.09 m."""
+    robot = Robot()
+    robot = robot.model_copy(update={"body": robot.body.model_copy(update={"length_m": 1.6})})
+    decision = Bench(robot).settle(free=free_space(nearest_m=nearest_m, known_m=5.0))
+    assert decision.target_speed_mps == 0.0
+    assert decision.reason.sentence == told
 
 
 def test_floor_that_was_not_seen_is_not_free() -> None:
