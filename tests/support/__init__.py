@@ -10,6 +10,7 @@ Made of known numbers, without images or devices:
 * recall.py - the memory of bodies out of view, scene by scene
 * video_moments.py - a hall with a crossing person and a crate, for the video
 * judging.py - evidence of motion, and the verdict on it
+* ballots.py - votes of predicted cells for parts of the grid
 * parts.py - parts and surfaces as vision/depth/regions.py measures them
 * point_motion.py - points that move before a camera
 * anchored_points.py - points anchored all over the view, and where they are seen after a motion
@@ -18,6 +19,7 @@ Depth and images:
 
 * grids.py - depth grids made of planes and plates
 * detections.py - detections without fragments, on exact depth grids
+* painted_scans.py - the scan of free space of single painted frames
 * walker.py - a plate that walks past, and what is found moving
 * painted.py - RGB-D frames painted from textured rectangles
 * painted_room.py - a painted room, and a crate to put into it
@@ -32,6 +34,7 @@ Recordings and cameras:
 
 Chassis drivers with their emulators and links:
 
+* arming_evidence.py - what a driver's arming is told of its base
 * wires.py - links with a plug to pull, and a pseudo-terminal that keeps pace with simulated time
 * serial_bench.py - a serial driver and its emulator on a wire in memory
 * kobuki_bench.py - the same for a Kobuki
@@ -56,6 +59,7 @@ Drives and decisions:
 * governed_drive.py - the same with the speed governor and a planner
 * governor_rig.py - the governor's loop with a planner by the time and an obedient base
 * runner_doubles.py - test doubles of what the runners step
+* bench_clocks.py - clocks and progress of the bench
 * hil_missions.py - short missions with the emulator as a process of its own
 * drive_process.py - what a test asks of a drive that runs as a process of its own
 

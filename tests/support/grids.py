@@ -98,6 +98,13 @@ def labelled(*masks: NDArray[np.bool_]) -> NDArray[np.int32]:
     return labels
 
 
+def block(rows: tuple[int, int], columns: tuple[int, int]) -> NDArray[np.bool_]:
+    """(ROWS, COLUMNS) the cells from rows[0] up to rows[1], and from columns[0] up to columns[1]."""
+    mask = np.zeros((ROWS, COLUMNS), np.bool_)
+    mask[slice(*rows), slice(*columns)] = True
+    return mask
+
+
 def people(apart_m: float, tall_m: tuple[float, float] = (1.7, 1.7), head_m: float = 0.2) -> FloatArray:
     """Depth of two, 3 m away, whose heads are apart_m from each other; their bodies, 0.45 m wide, touch."""
     seen = [plate(3.0, (-apart_m / 2, apart_m / 2), (-0.2, 0.8))]

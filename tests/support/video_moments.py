@@ -6,6 +6,7 @@ import numpy as np
 
 from config.robot import Body
 from controller.decision.decision import Action, Decision, Reason
+from controller.record.recorder import VideoSettings
 from controller.video.moment import VideoMoment
 from hal.geometry import camera_in_body
 from hal.types import CameraMount, FloatArray, Intrinsics, Pose, RgbdFrame
@@ -22,6 +23,7 @@ from vision.scene import (
 INTRINSICS = Intrinsics(640, 480, 610.0, 610.0, 319.5, 239.5)
 MOUNT = CameraMount(forward_m=0.45, left_m=0.0, height_m=0.60, pitch_rad=0.07)
 BODY = Body()
+AROUND = VideoSettings(MOUNT, BODY, 0.54, 30.0, 1.5, 10.0)
 STILL = Pose(np.eye(3), np.zeros(3))
 
 

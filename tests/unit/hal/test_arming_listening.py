@@ -6,7 +6,7 @@ import pytest
 
 from hal.chassis.arming import listen
 from hal.types import ChassisMode
-from tests.unit.hal.test_arming import LIMITS, at
+from tests.support.arming_evidence import LIMITS, at
 
 
 @pytest.mark.parametrize(

@@ -21,13 +21,7 @@ from tests.support.recordings import (
     depth_files,
     read_all,
     set_key,
-    write_recording,
 )
-
-
-@pytest.fixture
-def recording(tmp_path: Path) -> Path:
-    return write_recording(tmp_path / "recording", count=4)
 
 
 @pytest.mark.parametrize("read_ahead", [0, 1, 2, 64])

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from types import TracebackType
 from typing import Self
 
@@ -17,6 +16,7 @@ from controller.build import build_control, build_path
 from controller.build_chassis import build_base, build_base_in_memory
 from hal.types import ChassisMode, ChassisState, PlanarPose, Setpoint
 from sim.plant import TrackedPlant
+from tests.support.bench_clocks import Ticks, every
 
 MISSION = CONFIG_DIR / "sim.yaml"
 ROBOCLAW = CONFIG_DIR / "hil-roboclaw.yaml"
@@ -55,19 +55,6 @@ class Stubborn:
 
     def stop(self, now_ns: int) -> None:
         assert self.open
-
-
-def every(step_ns: int) -> Callable[[], int]:
-    readings = iter(range(0, 1 << 62, step_ns))
-    return lambda: next(readings)
-
-
-class Ticks:
-    def __init__(self) -> None:
-        self.count = 0
-
-    def __call__(self) -> None:
-        self.count += 1
 
 
 def test_the_stopwatch_runs_during_the_exchange_only() -> None:

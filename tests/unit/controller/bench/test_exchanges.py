@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import pytest
 
 from config.loader import CONFIG_DIR
@@ -11,15 +9,11 @@ from controller.bench import exchanges
 from controller.bench.exchanges import measure_exchanges, wires
 from controller.faults.trials import KINDS
 from hal.errors import DeviceNotFound
+from tests.support.bench_clocks import every
 
 SERIAL = [kind.replace("-", "_") for kind in KINDS if kind != "agilex"]
 NAMES = ["agilex_in_memory", "agilex_virtual_can", "agilex_multicast_can"]
 NAMES += [f"{kind}_{wire}" for kind in SERIAL for wire in ("in_memory", "pty")]
-
-
-def every(step_ns: int) -> Callable[[], int]:
-    readings = iter(range(0, 1 << 62, step_ns))
-    return lambda: next(readings)
 
 
 def test_every_driver_over_every_link() -> None:

@@ -1,8 +1,6 @@
 from __future__ import annotations
 
-import itertools
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -23,6 +21,7 @@ from controller.bench.perception import (
 from controller.bench.reel import Reel, recorded_reel
 from controller.bench.stages import modules_of
 from hal.cameras.tum_replay import TumReplay
+from tests.support.bench_clocks import Ticks, every
 from vision.perception import Perception
 
 DESK = Path(__file__).parents[3] / "recordings" / "desk_rpy"
@@ -38,19 +37,6 @@ def reel() -> Reel:
 
 def make() -> Perception:
     return Perception(PerceptionConfig(), None, 0.8, 0.05)
-
-
-class Ticks:
-    def __init__(self) -> None:
-        self.count = 0
-
-    def __call__(self) -> None:
-        self.count += 1
-
-
-def steady_clock(step_ns: int) -> Iterator[int]:
-    """Every interval between two readings is step_ns."""
-    return itertools.count(0, step_ns)
 
 
 def test_functions_that_a_frame_does_not_call_take_no_time_in_it() -> None:
@@ -74,7 +60,7 @@ def test_side_by_side_times_perception_and_its_calls(reel: Reel) -> None:
         expected.append(1000 * len(calls))
     assert expected[1] > 0
     side, ticks = PairedTimes(), Ticks()
-    stopwatches = Stopwatches(steady_clock(1000).__next__, steady_clock(7).__next__)
+    stopwatches = Stopwatches(every(1000), every(7))
     run_side_by_side(reel, make, SETTINGS, MODULES, stopwatches, side, ticks)
     assert side.detect_ns == side.track_ns == [1000, 1000]
     assert side.elapsed_ns == [7, 7]
@@ -86,7 +72,7 @@ def test_side_by_side_times_perception_and_its_calls(reel: Reel) -> None:
 
 def test_alone_times_perception_only(reel: Reel) -> None:
     side, ticks = PairedTimes(), Ticks()
-    run_alone(reel, make, Stopwatches(steady_clock(1000).__next__, steady_clock(7).__next__), side, ticks)
+    run_alone(reel, make, Stopwatches(every(1000), every(7)), side, ticks)
     assert side.alone_ns == [2000, 2000]
     assert side.total_ns == []
     assert ticks.count == 3

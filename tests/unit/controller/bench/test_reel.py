@@ -18,6 +18,7 @@ from hal.types import CameraMount
 from sim.rendering.camera import SimulatedCamera
 from sim.rendering.render import Renderer
 from sim.world import World
+from tests.support.bench_clocks import Ticks
 
 DESK = FilePath(__file__).parents[3] / "recordings" / "desk_rpy"
 MOUNT = CameraMount(0.4, 0.0, 0.6, 0.0)
@@ -35,14 +36,6 @@ def world() -> World:
 
 def camera_in(world: World) -> SimulatedCamera:
     return SimulatedCamera(world, CAMERA, MOUNT, SimulatedClock(), lambda stamp_ns: cruise(PATH, stamp_ns))
-
-
-class Ticks:
-    def __init__(self) -> None:
-        self.count = 0
-
-    def __call__(self) -> None:
-        self.count += 1
 
 
 def test_the_body_cruises_at_one_metre_a_second_and_stays_at_the_end() -> None:

@@ -15,7 +15,7 @@ from hal.cameras.tum_replay import TumReplay
 from hal.cameras.tum_writer import TumWriter
 from hal.errors import DeviceRefused
 from tests.support.runner_doubles import EmptyScenePerceiver, PeriodicCamera
-from tests.unit.controller.record.test_recorder import AROUND
+from tests.support.video_moments import AROUND
 
 
 def record(recorder: Recorder, frames: int) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from config.path import ArcSpec, LineSpec, PathSpec
-from config.robot import Body, Robot
+from config.robot import Robot
 from controller.path.path import Path
 from controller.perceive import Look
 from controller.record.observations import ObservationFile
@@ -18,15 +18,13 @@ from controller.record.recorder import (
     Recorder,
     RecordingOptions,
     RunRecorder,
-    VideoSettings,
     open_recorder,
     path_ahead,
 )
-from hal.types import CameraMount, ColourImage, PlanarPose
+from hal.types import ColourImage, PlanarPose
 from tests.support.runner_doubles import EmptyScenePerceiver, PeriodicCamera, control_step
-from tests.support.video_moments import frame
+from tests.support.video_moments import AROUND, frame
 
-AROUND = VideoSettings(CameraMount(0.45, 0.0, 0.6, 0.07), Body(), 0.54, 30.0, 1.5, 10.0)
 STRAIGHT = Path(PathSpec(segments=(LineSpec(kind="line", length_m=20.0),)), Robot())
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from config.perception import PerceptionConfig
 from hal.types import FloatArray
 from tests.support.detections import detection
-from tests.support.grids import CAMERA, COLUMNS, ROWS, grid_of, labelled, nearest, plate, wall
+from tests.support.grids import CAMERA, COLUMNS, ROWS, block, grid_of, labelled, nearest, plate, wall
 from vision.bodies import carving
 from vision.bodies.arrivals import Changes
 from vision.bodies.cutting import cut_out
@@ -25,12 +25,6 @@ CONFIG = PerceptionConfig()
 FRAME = 12
 BACK = wall(4.0)
 WHOLE = np.ones((ROWS, COLUMNS), np.bool_)
-
-
-def block(rows: tuple[int, int], columns: tuple[int, int]) -> NDArray[np.bool_]:
-    mask = np.zeros((ROWS, COLUMNS), np.bool_)
-    mask[slice(*rows), slice(*columns)] = True
-    return mask
 
 
 NOWHERE = block((0, 0), (0, 0))

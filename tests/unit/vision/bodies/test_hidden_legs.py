@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from hal.types import FloatArray, PlanarPose
+from tests.support.grids import block, grid_of, labelled, wall
 from tests.support.painted import QVGA, Quad, box, drive, record, vector
 from tests.support.painted_room import SIDEWAYS, TOWARDS, look, room
-from tests.unit.vision.depth.test_regions import SHAPE, flat, grid_of
 from vision.depth.occlusion import hidden_below
 from vision.depth.regions import measure
 from vision.scene import Obstacle
@@ -48,25 +48,19 @@ def test_standing_person_is_listed_once_the_screen_is_gone() -> None:
     assert not one.moving
 
 
-def labelled(rows: slice) -> np.ndarray[tuple[int, int], np.dtype[np.int32]]:
-    labels = np.zeros(SHAPE, np.int32)
-    labels[rows, 10:20] = 1
-    return labels
-
-
 def test_the_lower_end_is_hidden_by_what_is_nearer_only() -> None:
-    labels = labelled(slice(2, 12))
+    labels = labelled(block((2, 12), (10, 20)))
     for beneath_m, hides in ((2.0, True), (6.0, False), (3.9, False)):
-        depth = flat(4.0)
+        depth = wall(4.0)
         depth[12:] = beneath_m
         grid = grid_of(depth)
         assert hidden_below(grid, labels, measure(grid, labels, 1)).tolist() == [hides]
 
 
 def test_half_of_its_width_has_to_be_hidden() -> None:
-    labels = labelled(slice(2, 12))
+    labels = labelled(block((2, 12), (10, 20)))
     for columns, hides in ((slice(10, 17), True), (slice(10, 13), False)):
-        depth = flat(4.0)
+        depth = wall(4.0)
         depth[12:] = 6.0
         depth[12:, columns] = 2.0
         grid = grid_of(depth)
@@ -75,9 +69,9 @@ def test_half_of_its_width_has_to_be_hidden() -> None:
 
 def test_across_the_gap_beside_a_jump_the_nearer_one_is_found() -> None:
     """A stereo camera measures nothing for some cells before what is nearer."""
-    labels = labelled(slice(2, 12))
+    labels = labelled(block((2, 12), (10, 20)))
     for gap, hides in ((2, True), (3, False)):
-        depth = flat(4.0)
+        depth = wall(4.0)
         depth[12 : 12 + gap] = 0.0
         depth[12 + gap :] = 2.0
         grid = grid_of(depth)
@@ -85,9 +79,9 @@ def test_across_the_gap_beside_a_jump_the_nearer_one_is_found() -> None:
 
 
 def test_a_strip_is_nobody() -> None:
-    """Three rows at 4 m are 8 cm."""
-    labels = labelled(slice(9, 12))
-    depth = flat(4.0)
+    """Three rows at 4 m are 16 cm."""
+    labels = labelled(block((9, 12), (10, 20)))
+    depth = wall(4.0)
     depth[12:] = 2.0
     grid = grid_of(depth)
     assert hidden_below(grid, labels, measure(grid, labels, 1)).tolist() == [False]

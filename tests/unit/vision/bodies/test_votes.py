@@ -4,25 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
-from tests.support.grids import COLUMNS, ROWS, labelled
+from tests.support.ballots import MOVES, PART, vote
+from tests.support.grids import block, labelled
 from vision.bodies import votes
-
-
-def block(rows: tuple[int, int], columns: tuple[int, int]) -> NDArray[np.bool_]:
-    mask = np.zeros((ROWS, COLUMNS), np.bool_)
-    mask[slice(*rows), slice(*columns)] = True
-    return mask
-
-
-PART = labelled(block((10, 30), (10, 50)))  # 800 cells
-
-
-def vote(
-    *expected: NDArray[np.bool_], mover: tuple[bool, ...], parts: NDArray[np.int32] = PART
-) -> votes.Ballot:
-    return votes.count_votes(parts, int(parts.max()), labelled(*expected), len(mover), np.array(mover))
 
 
 def test_a_part_goes_to_whom_most_cells_speak_for() -> None:
@@ -107,7 +92,6 @@ def test_a_part_taken_from_its_winner_belongs_to_nobody() -> None:
 
 # Somebody who stood at a table, as one part with it, and the table; both are track 0's. A mover is track 1.
 CELLS = np.array([200, 300])
-MOVES = np.array([False, True])
 
 
 def ballot(*present: tuple[bool, bool]) -> votes.Ballot:

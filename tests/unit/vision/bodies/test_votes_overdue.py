@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.support.grids import labelled
-from tests.unit.vision.bodies.test_votes import MOVES, PART, block, vote
+from tests.support.ballots import MOVES, PART, vote
+from tests.support.grids import block, labelled
 from vision.bodies import votes
 
 HALF = block((10, 30), (10, 30))  # of PART; the other half is a crate's, which stands

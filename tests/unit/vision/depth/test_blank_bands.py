@@ -10,8 +10,8 @@ import pytest
 from numpy.typing import NDArray
 
 from hal.types import CameraMount
-from tests.support.painted import VGA, floor, wall
-from tests.unit.vision.depth.test_free_space import CENTRE, frame_of, inside, outside, space_of, with_depth
+from tests.support.painted import MOUNT, VGA, floor, wall
+from tests.support.painted_scans import CENTRE, frame_of, inside, outside, space_of
 from vision.scene import FreeSpace
 
 DOWN = CameraMount(0.0, 0.0, 0.9, math.radians(25.0))
@@ -19,16 +19,15 @@ HORIZON = round(VGA.cy)
 
 
 def seen_without(
-    columns: slice, rows: slice, share: float = 1.0, mount: CameraMount | None = None
+    columns: slice, rows: slice, share: float = 1.0, mount: CameraMount = MOUNT
 ) -> tuple[FreeSpace, NDArray[np.bool_]]:
     """The scan of a floor and a wall of which a share of some pixels has no depth; and its blank bands."""
-    frame = frame_of(floor() + wall()) if mount is None else frame_of(floor() + wall(), mount)
+    frame = frame_of(floor() + wall(), mount)
     depth = frame.depth.copy()
     lost = np.zeros(depth.shape, np.bool_)
     lost[rows, columns] = np.random.default_rng(1).random(lost[rows, columns].shape) < share
     depth[lost] = 0
-    frame = with_depth(frame, depth)
-    space = space_of(frame) if mount is None else space_of(frame, mount)
+    space = space_of(replace(frame, depth=depth), mount)
     assert space.blank is not None
     return space, space.blank
 

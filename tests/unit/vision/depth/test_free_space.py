@@ -8,34 +8,24 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from config.perception import PerceptionConfig
 from hal.geometry import camera_in_floor
-from hal.types import CameraMount, Intrinsics, PlanarPose, RgbdFrame
-from tests.support.painted import MOUNT, VGA, Quad, box, drive, floor, paint, plain, record, vector, wall
+from hal.types import CameraMount, Intrinsics
+from tests.support.painted import MOUNT, VGA, Quad, box, drive, floor, paint, record, vector, wall
+from tests.support.painted_scans import (
+    CENTRE,
+    HERE,
+    ROBOT_HEIGHT_M,
+    bare,
+    eyes_on,
+    frame_of,
+    inside,
+    outside,
+    space_of,
+)
 from vision.perception import Perception
-from vision.scene import NEVER_M, FreeSpace, Scene
-
-HERE = PlanarPose(0.0, 0.0, 0.0)
-CENTRE = slice(220, 420)  # image columns that are tampered with
-ROBOT_HEIGHT_M = 0.8
-
-
-def bare(quads: Sequence[Quad]) -> list[Quad]:
-    return [replace(one, texture=plain()) for one in quads]
-
-
-def frame_of(quads: Sequence[Quad], mount: CameraMount = MOUNT, noise: float = 0.0) -> RgbdFrame:
-    return paint(bare(quads), camera_in_floor(HERE, mount), VGA, depth_sigma_per_m=noise)
-
-
-def eyes_on(mount: CameraMount) -> Perception:
-    return Perception(PerceptionConfig(), mount, ROBOT_HEIGHT_M, clearance_m=0.05)
-
-
-def space_of(frame: RgbdFrame, mount: CameraMount = MOUNT) -> FreeSpace:
-    return eyes_on(mount).perceive(frame, None, None).scene.free_space
+from vision.scene import NEVER_M, Scene
 
 
 def scene_after_a_while(quads: Sequence[Quad]) -> Scene:
@@ -44,25 +34,6 @@ def scene_after_a_while(quads: Sequence[Quad]) -> Scene:
     for frame in record(quads, drive(), 4).frames:
         scene = eyes.perceive(frame, None, None).scene
     return scene
-
-
-def with_depth(frame: RgbdFrame, depth: NDArray[np.uint16]) -> RgbdFrame:
-    return replace(frame, depth=depth)
-
-
-def inside(space: FreeSpace, columns: slice = CENTRE) -> NDArray[np.bool_]:
-    """Bands that lie within the tampered columns as a whole."""
-    left, right = ((c - VGA.cx) / VGA.fx for c in (columns.start, columns.stop))
-    half = space.half_width_tan
-    result: NDArray[np.bool_] = (space.bearing_tan - half >= left) & (space.bearing_tan + half <= right)
-    return result
-
-
-def outside(space: FreeSpace, columns: slice = CENTRE) -> NDArray[np.bool_]:
-    left, right = ((c - VGA.cx) / VGA.fx for c in (columns.start, columns.stop))
-    half = space.half_width_tan
-    result: NDArray[np.bool_] = (space.bearing_tan + half <= left) | (space.bearing_tan - half >= right)
-    return result
 
 
 def test_levelled_bands_of_a_tipped_camera_lie_side_by_side() -> None:
@@ -107,7 +78,7 @@ def test_the_floor_stays_free_with_real_depth_noise() -> None:
 
 def test_without_any_depth_nothing_is_known() -> None:
     frame = frame_of(floor() + wall())
-    space = space_of(with_depth(frame, np.zeros_like(frame.depth)))
+    space = space_of(replace(frame, depth=np.zeros_like(frame.depth)))
     assert np.isinf(space.nearest_m).all()
     np.testing.assert_array_equal(space.known_m, 0.0)
 
@@ -116,7 +87,7 @@ def test_a_corridor_without_depth_is_unknown_and_its_sides_are_not() -> None:
     frame = frame_of(floor())
     depth = frame.depth.copy()
     depth[:, CENTRE] = 0
-    space = space_of(with_depth(frame, depth))
+    space = space_of(replace(frame, depth=depth))
     np.testing.assert_array_equal(space.known_m[inside(space)], 0.0)
     assert (space.known_m[outside(space)] > 9.0).all()
     assert np.count_nonzero(inside(space)) >= 20
@@ -127,7 +98,7 @@ def test_known_ends_where_a_glass_front_swallows_the_depth() -> None:
     depth = frame.depth.copy()
     # The floor 3 m ahead is fy 0.5 / 3 below the horizon; above it nothing comes back.
     depth[: round(VGA.cy + VGA.fy * 0.5 / 3.0), CENTRE] = 0
-    space = space_of(with_depth(frame, depth))
+    space = space_of(replace(frame, depth=depth))
     np.testing.assert_allclose(space.known_m[inside(space)], 3.0, atol=0.15)
     assert (space.known_m[outside(space)] > 9.0).all()
 
@@ -137,7 +108,7 @@ def test_known_ends_at_a_hole_in_the_floor_although_the_floor_goes_on_behind() -
     depth = frame.depth.copy()
     far, near = (round(VGA.cy + VGA.fy * 0.5 / z) for z in (3.0, 2.0))
     depth[far:near, CENTRE] = 0
-    space = space_of(with_depth(frame, depth))
+    space = space_of(replace(frame, depth=depth))
     np.testing.assert_allclose(space.known_m[inside(space)], 2.0, atol=0.1)
 
 
@@ -188,7 +159,7 @@ def test_single_noisy_pixels_are_no_obstacle() -> None:
     rng = np.random.default_rng(5)
     rows = rng.integers(20, 460, 300)
     depth[rows, rng.integers(0, 640, 300)] = 1000
-    space = space_of(with_depth(frame, depth))
+    space = space_of(replace(frame, depth=depth))
     np.testing.assert_allclose(space.nearest_m, 6.0, rtol=0.02)
 
 
