@@ -24,6 +24,12 @@ def test_no_package_imports_the_tests(name: str) -> None:
     assert [str(path) for path in (ROOT / name).rglob("*.py") if importing.search(path.read_text())] == []
 
 
+def test_no_test_imports_another() -> None:
+    """What they share is in tests/support."""
+    importing = re.compile(r"^\s*(from|import)\s+tests\.[\w.]*test_", re.MULTILINE)
+    assert [str(path) for path in (ROOT / "tests").rglob("*.py") if importing.search(path.read_text())] == []
+
+
 @pytest.mark.parametrize("name", [*PACKAGES, "tests/support"])
 def test_the_docstring_of_each_folder_lists_all_of_its_files(name: str) -> None:
     missing = []
