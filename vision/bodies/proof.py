@@ -5,7 +5,6 @@ The rules are in vision/bodies/proof_rules.py; vision/bodies/judgement.py adds t
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,18 +19,16 @@ from vision.bodies.proof_rules import (
     EVEN_CELLS,
     LARGEST_M,
     STANDING_SHARE,
+    Approach,
+    Demand,
     Ends,
     Opinion,
     Rim,
+    Shown,
     Surface,
     Velocity,
     arrival_of,
-    by_approach,
-    by_arrival,
-    by_fragments,
-    by_rim,
-    by_surface,
-    by_unrest,
+    is_evident,
     seems_to_move,
     shown_across,
     stands_surely,
@@ -70,13 +67,26 @@ class Proof:
     squared_sigmas: Vector
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Demands:
+    """What is asked of the proofs of T tracks; see Demand.
+
+    least_mps: (T,).
+    fastest_mps, threshold, dt_s: the same for all.
+    """
+
+    least_mps: Vector
+    fastest_mps: float
+    threshold: float
+    dt_s: float
+
+
 @inlined
-def _velocity(velocity: FloatArray, covariance: FloatArray, parts: Split, k: int, t: int) -> Velocity:
-    """Velocity k of track t with its components; for the arguments see _proofs."""
-    v, c = velocity[k, t], covariance[k, t]
+def _velocity(parts: Split, k: int, t: int) -> Velocity:
+    """Velocity k of track t with its components."""
     return Velocity(
-        speed_mps=math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]),
-        sigma_mps=math.sqrt(c[0, 0] + c[1, 1] + c[2, 2]),
+        speed_mps=parts.speed[k, t],
+        sigma_mps=parts.sigma[k, t],
         value=parts.value[k, t],
         along=parts.along[k, t],
         across=parts.across[k, t],
@@ -85,91 +95,104 @@ def _velocity(velocity: FloatArray, covariance: FloatArray, parts: Split, k: int
     )
 
 
-@compiled(
-    MotionEvidence,
-    "float64[:, :, ::1], float64[:, :, :, ::1]",
-    Split,
-    SecondOpinion,
-    "float64[:], boolean[:], float64, float64, float64",
-)
-def _proofs(
-    seen: MotionEvidence,
-    velocity: FloatArray,
-    covariance: FloatArray,
-    parts: Split,
-    second: SecondOpinion,
-    least_mps: FloatArray,
-    moving: BoolArray,
-    fastest_mps: float,
-    dt_s: float,
-    threshold: float,
-) -> tuple[BoolArray, FloatArray, BoolArray, BoolArray, BoolArray]:
-    """moves, strength, surely_static, over and goes_on of Proof.
+@inlined
+def _ends(seen: MotionEvidence, t: int, frame: Velocity, fastest_mps: float) -> Ends:
+    """The ends of track t. frame: the velocity that they agree on."""
+    alike = seen.agreement[t] * seen.ends[t]
+    # Ends that agree on an impossible velocity agree on a mistake, mostly of their depth.
+    believed = seen.agreement[t] >= _MIN_AGREEMENT and frame.speed_mps <= fastest_mps
+    return Ends(
+        all=seen.ends[t],
+        alike=alike,
+        agreeing=alike if believed else 0.0,
+        restless=seen.restless[t],
+        restless_s=seen.restless_s[t],
+    )
 
-    velocity (4, T, 3), covariance (4, T, 3, 3), parts: the four velocities of each track, and their
-    components. threshold: squared sigmas.
-    """
-    count = len(moving)
-    moves, surely_static = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
-    over, goes_on, strength = np.zeros(count, np.bool_), np.zeros(count, np.bool_), np.zeros(count)
-    for t in range(count):
-        filtered = _velocity(velocity, covariance, parts, _FILTERED, t)
-        frame = _velocity(velocity, covariance, parts, _FRAME, t)
-        centre = _velocity(velocity, covariance, parts, _SURFACE, t)
-        ends, cells, size_m = seen.ends[t], seen.cells[t], seen.size_m[t]
-        opinion = Opinion(
+
+@inlined
+def _shown(seen: MotionEvidence, parts: Split, second: SecondOpinion, demands: _Demands, t: int) -> Shown:
+    """What this frame shows of track t."""
+    frame, cells, size_m = _velocity(parts, _FRAME, t), seen.cells[t], seen.size_m[t]
+    turning_mps = _WANDER * seen.view_radps[t] * size_m
+    return Shown(
+        filtered=_velocity(parts, _FILTERED, t),
+        frame=frame,
+        centre=_velocity(parts, _SURFACE, t),
+        opinion=Opinion(
             denies_along=second.denies_along[t],
             denies_across=second.denies_across[t],
             confirms_along=second.confirms_along[t] and cells >= EVEN_CELLS,
             confirms_across=second.confirms_across[t],
-        )
-        alike = seen.agreement[t] * ends
-        # Ends that agree on an impossible velocity agree on a mistake, mostly of their depth.
-        believed = seen.agreement[t] >= _MIN_AGREEMENT and frame.speed_mps <= fastest_mps
-        agreeing = alike if believed else 0.0
-        track_ends = Ends(
-            all=ends, agreeing=agreeing, restless=seen.restless[t], restless_s=seen.restless_s[t]
-        )
-        turning_mps = _WANDER * seen.view_radps[t] * size_m
-        surface = Surface(
+        ),
+        ends=_ends(seen, t, frame, demands.fastest_mps),
+        surface=Surface(
             cells=cells,
             size_m=size_m,
             velocity_measured_s=seen.velocity_measured_s[t],
             wander_mps=turning_mps + seen.growth_mps[t],
             depth_sigma_m=seen.depth_sigma_m[t],
-        )
-        rim = Rim(
+        ),
+        rim=Rim(
             speed_mps=abs(seen.rim_mps[t]),
             sigmas=seen.rim_sigmas[t],
             shown_s=seen.rim_s[t],
             wander_mps=turning_mps,
+        ),
+        approach=Approach(
+            speed_mps=seen.approach_mps[t],
+            shown_s=seen.approach_s[t],
+            wander_mps=turning_mps,
+        ),
+        arrival=arrival_of(seen.arrived[t], seen.arriving_s[t], cells, demands.dt_s),
+    )
+
+
+@inlined
+def _strength(shown: Shown, threshold: float) -> float:
+    """How many times filter, fragments and number of ends exceed what a proof needs; the least of them."""
+    filtered, frame = shown.filtered, shown.frame
+    clear = np.minimum(np.maximum(filtered.along, filtered.across), np.maximum(frame.along, frame.across))
+    result: float = np.minimum(clear / threshold, shown.ends.agreeing / ENDS_ACROSS)
+    return result
+
+
+@compiled(MotionEvidence, Split, SecondOpinion, _Demands, "boolean[:]")
+def _proofs(
+    seen: MotionEvidence, parts: Split, second: SecondOpinion, demands: _Demands, moving: BoolArray
+) -> tuple[BoolArray, FloatArray, BoolArray, BoolArray, BoolArray]:
+    """moves, strength, surely_static, over and goes_on of Proof.
+
+    parts: the four velocities of each track. second: of surface on fragments. moving (T,): last verdict.
+    """
+    count = len(moving)
+    moves, surely_static = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
+    over, goes_on, strength = np.zeros(count, np.bool_), np.zeros(count, np.bool_), np.zeros(count)
+    for t in range(count):
+        asked = Demand(
+            least_mps=demands.least_mps[t],
+            fastest_mps=demands.fastest_mps,
+            threshold=demands.threshold,
+            dt_s=demands.dt_s,
         )
-        arrival = arrival_of(seen.arrived[t], seen.arriving_s[t], cells, dt_s)
-        possible = filtered.speed_mps <= fastest_mps and size_m <= LARGEST_M
-        fast = filtered.speed_mps > least_mps[t]
-        evident = (
-            by_fragments(filtered, frame, opinion, track_ends, threshold)
-            or by_unrest(filtered, track_ends, threshold)
-            or by_arrival(filtered, arrival.some, threshold)
-            or by_surface(centre, surface, least_mps[t], dt_s, threshold)
-            or by_approach(seen.approach_mps[t], seen.approach_s[t], least_mps[t] + turning_mps, dt_s)
-            or (by_rim(rim, filtered, size_m, least_mps[t], dt_s, threshold) and rim.speed_mps <= fastest_mps)
-        )
+        shown = _shown(seen, parts, second, demands, t)
+        filtered, arrival = shown.filtered, shown.arrival
+        possible = filtered.speed_mps <= asked.fastest_mps and shown.surface.size_m <= LARGEST_M
+        fast = filtered.speed_mps > asked.least_mps
         # The place where a mover has stopped was free a moment ago, so its arrival there is no proof.
-        stands = not fast and filtered.sigma_mps < _KNOWN_SPEED * least_mps[t]
+        stands = not fast and filtered.sigma_mps < _KNOWN_SPEED * asked.least_mps
         stopped = moving[t] and stands
         came = (arrival.much and not stopped) or (arrival.lasting and not stands)
-        moves[t] = seen.trusted and possible and ((evident and fast) or came)
-        shown = np.minimum(np.maximum(filtered.along, filtered.across), np.maximum(frame.along, frame.across))
-        strength[t] = np.minimum(shown / threshold, agreeing / ENDS_ACROSS)
-        surely_static[t] = stands_surely(frame, agreeing, least_mps[t])
+        moves[t] = seen.trusted and possible and ((fast and is_evident(shown, asked)) or came)
+        strength[t] = _strength(shown, asked.threshold)
+        surely_static[t] = stands_surely(shown, asked)
         # Neither depth nor a fragment tells it from the static surface beside it, along which it would drift.
-        lost = moving[t] and seen.border_is_guess[t] and ends == 0 and not arrival.some
-        slow = filtered.speed_mps < STANDING_SHARE * least_mps[t]
+        lost = moving[t] and seen.border_is_guess[t] and shown.ends.all == 0 and not arrival.some
+        slow = filtered.speed_mps < STANDING_SHARE * asked.least_mps
         over[t] = surely_static[t] or (stopped and slow) or lost
-        still_moves = moving[t] and seems_to_move(filtered, seen.advances[t], arrival.some, least_mps[t])
+        still_moves = moving[t] and seems_to_move(shown, seen.advances[t], asked)
         # One fragment alone is no proof, but a reason to keep what more of them showed.
-        one_moves = possible and fast and alike >= 2 and shown_across(filtered, frame, threshold)
+        one_moves = possible and fast and shown.ends.alike >= 2 and shown_across(shown, asked.threshold)
         goes_on[t] = still_moves or one_moves or (seen.restless[t] and not moving[t])
     return moves, strength, surely_static, over, goes_on
 
@@ -188,18 +211,8 @@ def prove(
     second = second_opinion(parts, _FILTERED, _SURFACE, _APART)
     alone_mps = 0.0 if seen.reckoned else _ALONE_MPS
     least_mps = settings.min_speed_mps + alone_mps + _SPEED_PER_METRE * seen.distance_m
-    moves, strength, surely_static, over, goes_on = _proofs(
-        seen,
-        velocity,
-        covariance,
-        parts,
-        second,
-        least_mps,
-        moving,
-        fastest_mps,
-        dt_s,
-        settings.sigmas**2,
-    )
+    demands = _Demands(least_mps, fastest_mps, settings.sigmas**2, dt_s)
+    moves, strength, surely_static, over, goes_on = _proofs(seen, parts, second, demands, moving)
     return Proof(
         moves=moves,
         strength=strength,

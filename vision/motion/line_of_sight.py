@@ -28,6 +28,7 @@ _NOWHERE = np.zeros(3)
 class Split:
     """K velocities of each of T bodies, split along and across the line of sight.
 
+    speed, sigma: of the whole velocity: its length, and the root of the sum of its variances, (K, T).
     value, variance: the component along it, (K, T).
     rest: the remainder, across it, (K, T, 3).
     along, across, total: squared Mahalanobis distance from zero of the component along, of the remainder, and
@@ -35,6 +36,8 @@ class Split:
     level: the same of the level component across, (K, T); equal to across where the floor is not known.
     """
 
+    speed: Matrix
+    sigma: Matrix
     value: Matrix
     variance: Matrix
     rest: Matrices
@@ -51,7 +54,7 @@ def decompose(
 
     sight (T, 3): unit vectors along the lines of sight. up (3,): the floor's normal, None if not known.
     """
-    value, variance, rest, along, across, total, level = _parts(
+    speed, sigma, value, variance, rest, along, across, total, level = _parts(
         np.ascontiguousarray(velocity).reshape(-1, _AXES),
         np.ascontiguousarray(covariance).reshape(-1, _AXES, _AXES),
         np.ascontiguousarray(sight),
@@ -60,6 +63,8 @@ def decompose(
     shape = velocity.shape[:-1]
     across = across.reshape(shape)
     return Split(
+        speed=speed.reshape(shape),
+        sigma=sigma.reshape(shape),
         value=value.reshape(shape),
         variance=variance.reshape(shape),
         rest=rest.reshape(velocity.shape),
@@ -129,17 +134,30 @@ def _put_level_direction(sight: FloatArray, up: FloatArray, level_direction: Flo
 @compiled("float64[:, ::1], float64[:, :, ::1], float64[:, ::1], float64[::1]")
 def _parts(
     velocity: FloatArray, covariance: FloatArray, sight: FloatArray, up: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-    """value, variance, rest, along, across, total and level of Split, of velocities (K, 3).
+) -> tuple[
+    FloatArray,
+    FloatArray,
+    FloatArray,
+    FloatArray,
+    FloatArray,
+    FloatArray,
+    FloatArray,
+    FloatArray,
+    FloatArray,
+]:
+    """The fields of Split, of velocities (K, 3).
 
     K is a multiple of T: one velocity of each of T bodies, then another one of each, and so on.
     """
     count = len(velocity)
+    speed, sigma = np.empty(count), np.empty(count)
     value, variance, rest = np.empty(count), np.empty(count), np.empty((count, _AXES))
     along, across, total, level = np.empty(count), np.empty(count), np.empty(count), np.empty(count)
     regularised, level_direction = np.empty((_AXES, _AXES)), np.empty(_AXES)
     for k in range(count):
         own, spread, towards = velocity[k], covariance[k], sight[k % len(sight)]
+        speed[k] = math.sqrt(own[0] * own[0] + own[1] * own[1] + own[2] * own[2])
+        sigma[k] = math.sqrt(spread[0, 0] + spread[1, 1] + spread[2, 2])
         value[k], variance[k] = _component(own, spread, towards)
         along[k] = value[k] * value[k] / (variance[k] + _FLOOR)
         for i in range(_AXES):
@@ -155,7 +173,7 @@ def _parts(
         _put_level_direction(towards, up, level_direction)
         sideways, sideways_variance = _component(own, spread, level_direction)
         level[k] = sideways * sideways / (sideways_variance + _FLOOR)
-    return value, variance, rest, along, across, total, level
+    return speed, sigma, value, variance, rest, along, across, total, level
 
 
 @dataclass(frozen=True, slots=True, eq=False)
