@@ -10,19 +10,41 @@ from numpy.typing import NDArray
 
 from hal.types import Intrinsics, Pose
 from vision.depth.depth_grid import DepthGrid
-from vision.ego_motion.camera_motion import CameraEstimate
+from vision.ego_motion.camera_motion import MIN_AGREEMENT, CameraEstimate
 from vision.ego_motion.motion_prior import MotionPrior
 from vision.motion.velocities import EndResiduals
 from vision.scene import CameraHealth, EgoMotion, SeenFloor
 
-# The ego-motion of a frame that was not compared with the one before.
-MOTION_NOT_KNOWN = EgoMotion(
-    motion=Pose(np.eye(3), np.zeros(3)),
-    dt_s=0.0,
-    source="none",
-    inlier_ratio=math.nan,
-    sigma_translation_m=math.inf,
-    sigma_rotation_rad=math.inf,
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CameraMotion:
+    """The camera's motion since the frame before, and what is to be thought of it.
+
+    ego: the motion.
+    known: it is known well enough to call anything else moving.
+    reckoned: odometry supports it.
+    blurred: few fragments fit one motion of the camera under the assumed noise; never with odometry.
+    """
+
+    ego: EgoMotion
+    known: bool
+    reckoned: bool
+    blurred: bool
+
+
+# Of a frame that was not compared with the one before.
+NOT_COMPARED = CameraMotion(
+    EgoMotion(
+        motion=Pose(np.eye(3), np.zeros(3)),
+        dt_s=0.0,
+        source="none",
+        inlier_ratio=math.nan,
+        sigma_translation_m=math.inf,
+        sigma_rotation_rad=math.inf,
+    ),
+    known=False,
+    reckoned=False,
+    blurred=False,
 )
 
 
@@ -69,10 +91,10 @@ class Detection:
     floor: SeenFloor | None = None
 
 
-def ego_motion_of(found: CameraEstimate, step: Pose, dt_s: float, prior: MotionPrior) -> EgoMotion:
-    """The EgoMotion of an estimate. step: the camera's motion in dt_s."""
+def camera_motion_of(found: CameraEstimate, step: Pose, dt_s: float, prior: MotionPrior) -> CameraMotion:
+    """The CameraMotion of an estimate. step: the camera's motion in dt_s."""
     variance = found.covariance.diagonal()
-    return EgoMotion(
+    ego = EgoMotion(
         motion=step,
         dt_s=dt_s,
         source="visual" if found.visual else "disputed" if found.disputed else prior.source,
@@ -80,9 +102,13 @@ def ego_motion_of(found: CameraEstimate, step: Pose, dt_s: float, prior: MotionP
         sigma_translation_m=float(np.sqrt(variance[3:].sum())),
         sigma_rotation_rad=float(np.sqrt(variance[:3].sum())),
     )
+    reckoned = prior.source != "none"
+    blurred = found.visual and not reckoned and found.inlier_ratio < MIN_AGREEMENT
+    known = ego.source in ("visual", "odometry") and (found.noisy or not blurred)
+    return CameraMotion(ego, known, reckoned, blurred)
 
 
-def no_motion(count: int) -> EndResiduals:
+def unknown_residuals(count: int) -> EndResiduals:
     """Residuals of count ends of which nothing is known: none is usable."""
     return EndResiduals(
         static_m=np.tile(np.array([0.0, 0.0, 1.0]), (count, 1)),

@@ -7,7 +7,7 @@ and the camera's health is checked. track (vision/tracker.py) takes the Detectio
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -17,13 +17,13 @@ from config.perception import PerceptionConfig
 from hal.types import CameraMount, FloatArray, Pose, RgbdFrame
 from vision.camera.floor import FloorFinder, on_floor
 from vision.camera.gyro import GyroMemory
-from vision.camera.health import Continuity, HealthMonitor, with_ego_motion
+from vision.camera.health import Continuity, FrameCheck, HealthMonitor, with_ego_motion
 from vision.camera.lens import vector_from_rotation
 from vision.camera.mount_check import MountCheck
 from vision.depth.depth_grid import DepthGrid, make_grid
 from vision.depth.depth_mask import surface_depth
-from vision.detection import MOTION_NOT_KNOWN, Detection, ego_motion_of, no_motion
-from vision.ego_motion.camera_motion import MIN_AGREEMENT, CameraEstimate, estimate
+from vision.detection import NOT_COMPARED, CameraMotion, Detection, camera_motion_of, unknown_residuals
+from vision.ego_motion.camera_motion import CameraEstimate, estimate
 from vision.ego_motion.motion_memory import MotionMemory
 from vision.ego_motion.motion_prior import MotionPrior
 from vision.ego_motion.rolling_shutter import ReadOut
@@ -38,13 +38,27 @@ from vision.motion.expected import expected_px, known_motion
 from vision.motion.residuals import observed_variance_scale, residuals
 from vision.motion.velocities import EndResiduals
 from vision.percept import Percept
-from vision.scene import CameraCondition, CameraHealth, EgoMotion
+from vision.scene import CameraCondition, CameraHealth
 
 _IDENTITY = Pose(np.eye(3), np.zeros(3))
 _NO_SWEEP = np.zeros(2)
 # A search for new fragments takes about a millisecond, which there is time for in every frame at 30 Hz. At a
 # lower rate there is time for several in a frame, and the image must not take longer to be searched.
 _TURN_S = 1.0 / 30.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Now:
+    """A frame, and what is known of it before anything is tracked in it.
+
+    grey: its colour image. odometry: the camera by dead reckoning, None where not known.
+    """
+
+    frame: RgbdFrame
+    grey: GreyImage
+    grid: DepthGrid
+    odometry: Pose | None
+    health: CameraHealth
 
 
 class Detector:
@@ -81,39 +95,32 @@ class Detector:
         grey = np.asarray(cv2.cvtColor(frame.colour, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
         grid = self._grid(frame)
         check = self._health.check(frame, grey, grid, odometry)
-        usable = check.usable_colour and check.usable_depth
+        now = _Now(frame, grey, grid, odometry, self._judge(check, grid, frame.captured_ns))
+        if not check.usable or check.continuity in (Continuity.REPEATED, Continuity.BACKWARD):
+            return self._not_usable(now)
+        # dt_s is negative if time stepped back at a frame that was not usable.
+        dt_s = (frame.captured_ns - self._last_ns) * 1e-9
+        in_time = check.continuity is Continuity.NEXT and 0.0 < dt_s <= self._config.max_gap_s
+        if in_time and len(self._images) > 0 and self._images[0].shape == grey.shape:
+            return self._next_frame(now, previous, dt_s)
+        return self._restart(now)
+
+    def _judge(self, check: FrameCheck, grid: DepthGrid, captured_ns: int) -> CameraHealth:
+        """The camera's health by the images and the mounting, before anything is tracked."""
         health = check.health
-        if self._mount is not None and usable:
-            health = self._mount_check.judge(grid, frame.captured_ns, health)
-        known = len(self._images) > 0 and self._images[0].shape == grey.shape
+        if self._mount is not None and check.usable:
+            health = self._mount_check.judge(grid, captured_ns, health)
         if check.continuity is Continuity.REPEATED and health.condition is CameraCondition.GOOD:
             # A repeated image cannot have a better health than it was reported with before.
             health = replace(self._last_health, valid_depth_ratio=health.valid_depth_ratio)
-        if not usable or check.continuity in (Continuity.REPEATED, Continuity.BACKWARD):
-            return self._not_usable(frame, grid, health)
-        if check.continuity is not Continuity.NEXT or not known:
-            return self._restart(frame, grey, grid, odometry, health)
-        dt_s = (frame.captured_ns - self._last_ns) * 1e-9
-        # dt_s is negative if time stepped back at a frame that was not usable.
-        if not 0.0 < dt_s <= self._config.max_gap_s:
-            return self._restart(frame, grey, grid, odometry, health)
-        return self._next_frame(frame, grey, grid, odometry, previous, dt_s, health)
+        return health
 
-    def _next_frame(
-        self,
-        frame: RgbdFrame,
-        grey: GreyImage,
-        grid: DepthGrid,
-        odometry: Pose | None,
-        previous: Percept | None,
-        dt_s: float,
-        health: CameraHealth,
-    ) -> Detection:
+    def _next_frame(self, now: _Now, previous: Percept | None, dt_s: float) -> Detection:
         """Detect in a frame that comes dt_s after the one before it and can be compared with it."""
-        config, store = self._config, self._store
+        frame, config, store = now.frame, self._config, self._store
         turn_rad = self._gyro.turn_rad(self._last_ns, frame.captured_ns)
-        prior = self._memory.prior(odometry, turn_rad, dt_s)
-        images = pyramid(grey, config.fragments)
+        prior = self._memory.prior(now.odometry, turn_rad, dt_s)
+        images = pyramid(now.grey, config.fragments)
         excluded = self._track_ends(frame, images, prior, previous, dt_s)
         anchor = store.anchors(frame.captured_ns, config.motion.window_s)
         depths = depths_with_sigma(anchor, config.depth_noise)
@@ -122,35 +129,23 @@ class Detector:
         sweep, obstacles = self._read_out.sweep(), previous.scene.obstacles if previous else ()
         found = estimate(static, pixels, self._pose, prior, sweep, frame.intrinsics, obstacles)
         motion = self._measure_residuals(frame, anchor, depths, found, excluded)
+        camera = self._learn_motion(found, prior, dt_s)
+        health = with_ego_motion(now.health, camera.ego, camera.blurred, camera.reckoned)
+        detection = self._detection(replace(now, health=health), motion, camera)
+        self._renew_fragments(now, previous, excluded, dt_s)
+        if camera.ego.source != "visual" or camera.blurred:
+            store.break_history()
+        self._commit(now, images, found.sweep_rad)
+        return detection
+
+    def _learn_motion(self, found: CameraEstimate, prior: MotionPrior, dt_s: float) -> CameraMotion:
+        """Take over the camera's new pose, and learn from its motion for the frames to come."""
         step = self._pose.inverse() @ found.pose
         self._read_out.learn(found, vector_from_rotation(step.rotation), dt_s)
         self._pose = found.pose
-        ego, reckoned = ego_motion_of(found, step, dt_s, prior), prior.source != "none"
-        self._memory.learn(step, dt_s, ego.source)
-        blurred = found.visual and not reckoned and found.inlier_ratio < MIN_AGREEMENT
-        detection = self._detection(
-            frame,
-            grid,
-            with_ego_motion(health, ego, blurred, reckoned),
-            motion,
-            ego,
-            dt_s=dt_s,
-            motion_known=ego.source in ("visual", "odometry") and (found.noisy or not blurred),
-            reckoned=reckoned,
-            blurred=blurred,
-        )
-        on_movers = excluded & ~store.body_only
-        store.keep(~self._renewal.crowded(store.ends_px, on_movers, grey.shape))
-        turns = max(round(dt_s / _TURN_S), 1)
-        looked = previous is not None and self._look_closer(frame, grey, previous.needs_fragments, turns)
-        # A look at a body takes the place of a renewal, but never twice in a row.
-        self._renewed = turns > 1 or not (looked and self._renewed)
-        if self._renewed:
-            self._renew(frame, grey, turns)
-        if ego.source != "visual" or blurred:
-            store.break_history()
-        self._commit(frame, images, odometry, found.sweep_rad)
-        return detection
+        camera = camera_motion_of(found, step, dt_s, prior)
+        self._memory.learn(step, dt_s, camera.ego.source)
+        return camera
 
     def _track_ends(
         self, frame: RgbdFrame, images: Pyramid, prior: MotionPrior, previous: Percept | None, dt_s: float
@@ -215,83 +210,82 @@ class Detector:
                 return on_floor(grid, floor, self._config.depth_noise)
         return grid
 
-    def _renew(self, frame: RgbdFrame, grey: GreyImage, turns: int = 1) -> None:
+    def _renew_fragments(
+        self, now: _Now, previous: Percept | None, excluded: NDArray[np.bool_], dt_s: float
+    ) -> None:
+        """Make room where fragments on movers crowd, and find new ones. excluded (N,): see _track_ends."""
+        store, turns = self._store, max(round(dt_s / _TURN_S), 1)
+        on_movers = excluded & ~store.body_only
+        store.keep(~self._renewal.crowded(store.ends_px, on_movers, now.grey.shape))
+        looked = previous is not None and self._look_closer(now, previous.needs_fragments, turns)
+        # A look at a body takes the place of a renewal, but never twice in a row.
+        self._renewed = turns > 1 or not (looked and self._renewed)
+        if self._renewed:
+            self._renew(now, turns)
+
+    def _renew(self, now: _Now, turns: int = 1) -> None:
         without_depth = int(np.count_nonzero(np.isnan(self._store.near_m).all(axis=1)))
-        new = self._renewal.find(frame, grey, self._store.ends_px, without_depth, turns)
+        new = self._renewal.find(now.frame, now.grey, self._store.ends_px, without_depth, turns)
         self._store.add(new.ends_px, new.near_m, new.far_m, new.pixel_cov)
 
-    def _look_closer(self, frame: RgbdFrame, grey: GreyImage, bodies: NeedsFragments, turns: int) -> bool:
+    def _look_closer(self, now: _Now, bodies: NeedsFragments, turns: int) -> bool:
         """Look at one body a turn, while it is the turn of any. Whether at least one was looked at."""
         for turn in range(turns):
-            new = self._attention.find(frame, grey, self._store.ends_px, bodies)
+            new = self._attention.find(now.frame, now.grey, self._store.ends_px, bodies)
             if new is None:
                 return turn > 0
             self._store.add(new.ends_px, new.near_m, new.far_m, new.pixel_cov, body_only=True)
         return True
 
-    def _commit(
-        self, frame: RgbdFrame, images: Pyramid, odometry: Pose | None, sweep_rad: FloatArray
-    ) -> None:
-        self._store.commit(frame.captured_ns, self._pose, frame.intrinsics, sweep_rad)
-        self._images, self._last_ns = images, frame.captured_ns
-        self._memory.note_odometry(odometry)
-        self._gyro.forget(frame.captured_ns)
+    def _commit(self, now: _Now, images: Pyramid, sweep_rad: FloatArray) -> None:
+        """The next frame is compared with this one."""
+        captured_ns = now.frame.captured_ns
+        self._store.commit(captured_ns, self._pose, now.frame.intrinsics, sweep_rad)
+        self._images, self._last_ns = images, captured_ns
+        self._memory.note_odometry(now.odometry)
+        self._gyro.forget(captured_ns)
 
-    def _restart(
-        self,
-        frame: RgbdFrame,
-        grey: GreyImage,
-        grid: DepthGrid,
-        odometry: Pose | None,
-        health: CameraHealth,
-    ) -> Detection:
+    def _restart(self, now: _Now) -> Detection:
         """Begin anew: at the first frame, after a gap or a step back of time, or with another image size."""
         self._store.clear()
         self._read_out.forget_last()
         self._memory.forget()
-        self._renew(frame, grey)
-        motion = no_motion(2 * len(self._store))
-        detection = self._detection(frame, grid, health, motion, restarted=True)
-        self._commit(frame, pyramid(grey, self._config.fragments), odometry, _NO_SWEEP)
+        self._renew(now)
+        detection = self._detection(now, unknown_residuals(2 * len(self._store)), restarted=True)
+        self._commit(now, pyramid(now.grey, self._config.fragments), _NO_SWEEP)
         return detection
 
-    def _not_usable(self, frame: RgbdFrame, grid: DepthGrid, health: CameraHealth) -> Detection:
+    def _not_usable(self, now: _Now) -> Detection:
         """A frame in which nothing can be tracked; the fragments wait for the next usable frame."""
         self._read_out.forget_last()
-        return self._detection(frame, grid, health, no_motion(2 * len(self._store)))
+        return self._detection(now, unknown_residuals(2 * len(self._store)))
 
     def _detection(
         self,
-        frame: RgbdFrame,
-        grid: DepthGrid,
-        health: CameraHealth,
+        now: _Now,
         motion: EndResiduals,
-        ego: EgoMotion = MOTION_NOT_KNOWN,
+        camera: CameraMotion = NOT_COMPARED,
         *,
-        dt_s: float = 0.0,
         restarted: bool = False,
-        motion_known: bool = False,
-        reckoned: bool = False,
-        blurred: bool = False,
     ) -> Detection:
-        store, self._last_health = self._store, health
+        frame, store, self._last_health = now.frame, self._store, now.health
         return Detection(
             captured_ns=frame.captured_ns,
             sequence=frame.sequence,
-            dt_s=dt_s,
+            dt_s=camera.ego.dt_s,
             camera=frame.intrinsics,
-            grid=grid,
+            grid=now.grid,
             ids=store.ids,
             ends_px=store.ends_px,
             near_m=store.near_m,
             age_frames=store.age_frames.copy(),
             motion=motion,
             pose=self._pose,
-            ego_motion=ego,
-            health=health,
+            ego_motion=camera.ego,
+            health=now.health,
             restarted=restarted,
-            motion_known=motion_known,
-            reckoned=reckoned,
-            blurred=blurred,
+            motion_known=camera.known,
+            reckoned=camera.reckoned,
+            blurred=camera.blurred,
             floor=self._mount_check.floor,
         )

@@ -46,10 +46,9 @@ class Continuity(Enum):
 
 @dataclass(frozen=True, slots=True)
 class FrameCheck:
-    """usable_colour, usable_depth: whether the images say anything. health: what the scene reports."""
+    """usable: whether both images say anything. health: what the scene reports."""
 
-    usable_colour: bool
-    usable_depth: bool
+    usable: bool
     continuity: Continuity
     health: CameraHealth
 
@@ -88,8 +87,8 @@ class HealthMonitor:
             self._last_grey = grey
         if repeated and continuity is Continuity.NEXT:
             continuity = Continuity.REPEATED
-        usable_colour = max(dark, bright) < _BAD_SHARE
-        return FrameCheck(usable_colour, usable_depth, continuity, _verdict(problems, share))
+        usable = usable_depth and max(dark, bright) < _BAD_SHARE
+        return FrameCheck(usable, continuity, _verdict(problems, share))
 
     def _continuity(self, frame: RgbdFrame) -> tuple[Continuity, float]:
         if self._last_ns is None:

@@ -12,7 +12,7 @@ from hal.types import FloatArray, Pose
 from tests.support.detections import AT_ORIGIN, detection, no_ends, track
 from tests.support.grids import CAMERA, grid_of, nearest, no_depth, plate, wall
 from tests.support.walker import FRAME_S, SPEED_MPS, moving, walker, way_m
-from vision.detection import no_motion
+from vision.detection import unknown_residuals
 from vision.motion.velocities import EndResiduals
 from vision.percept import Percept
 from vision.tracker import Tracker
@@ -45,7 +45,9 @@ def owner_of_a_fragment(speed_mps: float, age_frames: int, static_chi2: float, d
         seen = detection(grid_of(walker(x_m)), k)
         if k == 24:
             u = CAMERA.cx + CAMERA.fx * x_m / 4.0
-            motion = replace(no_motion(2), static_chi2=np.full(2, static_chi2), usable=np.ones(2, np.bool_))
+            motion = replace(
+                unknown_residuals(2), static_chi2=np.full(2, static_chi2), usable=np.ones(2, np.bool_)
+            )
             seen = replace(
                 seen,
                 ids=np.array([7]),

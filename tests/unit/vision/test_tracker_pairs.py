@@ -10,7 +10,7 @@ from config.perception import PerceptionConfig
 from hal.types import FloatArray
 from tests.support.detections import FRAME_NS, detection, track
 from tests.support.grids import CAMERA, grid_of, nearest, people, plate
-from vision.detection import no_motion
+from vision.detection import unknown_residuals
 from vision.tracker import Tracker
 
 PACE_M = 0.8 * FRAME_NS * 1e-9  # in one frame
@@ -54,7 +54,9 @@ def tracks_of_a_pair(static_chi2: float) -> int:
     u = CAMERA.cx + CAMERA.fx * x_m / 3.0
     ends_px = np.stack((np.column_stack((u, np.full(4, 120.0))), np.column_stack((u, np.full(4, 150.0)))), 1)
     for k in range(8):
-        motion = replace(no_motion(8), static_chi2=np.full(8, static_chi2), usable=np.ones(8, np.bool_))
+        motion = replace(
+            unknown_residuals(8), static_chi2=np.full(8, static_chi2), usable=np.ones(8, np.bool_)
+        )
         seen = replace(
             detection(grid_of(people(0.4)), k),
             ids=np.arange(4),

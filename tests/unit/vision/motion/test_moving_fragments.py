@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from hal.types import FloatArray
-from vision.detection import no_motion
+from vision.detection import unknown_residuals
 from vision.motion.moving_fragments import cluster, long_static, moving_candidates
 from vision.motion.velocities import EndResiduals
 
 
 def seen(static_chi2: tuple[float, float], usable: tuple[bool, bool] = (True, True)) -> EndResiduals:
     """Two ends of one fragment."""
-    return replace(no_motion(2), static_chi2=np.array(static_chi2), usable=np.array(usable))
+    return replace(unknown_residuals(2), static_chi2=np.array(static_chi2), usable=np.array(usable))
 
 
 def test_long_static_are_those_whose_ends_have_both_lain_still_for_a_while() -> None:
