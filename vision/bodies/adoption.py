@@ -12,8 +12,9 @@ from config.perception import DepthNoise
 from hal.compiled import compiled
 from hal.types import FloatArray
 from vision.bodies.tracks import Tracks
+from vision.depth.cells import nearest_cell
 from vision.depth.connected import IntGrid
-from vision.depth.depth_grid import DepthGrid, nearest_cell
+from vision.depth.depth_grid import DepthGrid
 from vision.depth.depth_noise import depth_sigma_of
 from vision.detection import Detection
 from vision.motion.moving_fragments import long_static

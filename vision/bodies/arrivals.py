@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from config.perception import DepthNoise
 from hal.compiled import compiled, inlined
 from hal.types import FloatArray, Pose
+from vision.depth.cells import lattice_of, place_of
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import BoolGrid, DepthGrid, FloatGrid
 from vision.numerics.relative_pose import NEAREST_M, Rows, coordinate_m, relative_rows
@@ -187,16 +188,15 @@ def _project_row(grid: DepthGrid, row: int, rows: Rows, cell: IntGrid, inverse: 
     """
     ray_x, ray_y, depth_m = grid.x, grid.y, grid.depth_m
     columns, width, height = np.int32(len(ray_x)), np.float32(len(ray_x)), np.float32(len(ray_y))
-    left, top, zero = ray_x[0], ray_y[0], np.float32(0.0)
-    per_column, per_row = np.float32(1.0) / (ray_x[1] - left), np.float32(1.0) / (ray_y[1] - top)
+    lattice, zero = lattice_of(ray_x, ray_y), np.float32(0.0)
     to_x, to_y, to_z = rows
     for j in range(columns):
         z = depth_m[row, j]
         x, y = ray_x[j] * z, ray_y[row] * z
         there_m = coordinate_m(to_z, x, y, z)
         inverse[j] = np.float32(1.0) / there_m
-        u = (coordinate_m(to_x, x, y, z) * inverse[j] - left) * per_column + np.float32(0.5)
-        v = (coordinate_m(to_y, x, y, z) * inverse[j] - top) * per_row + np.float32(0.5)
+        there_x, there_y = coordinate_m(to_x, x, y, z), coordinate_m(to_y, x, y, z)
+        u, v = place_of(there_x * inverse[j], there_y * inverse[j], lattice)
         inside = (there_m > NEAREST_M) & (u >= zero) & (v >= zero) & (u < width) & (v < height)
         cell[j] = np.int32(v) * columns + np.int32(u) if inside else np.int32(-1)
 

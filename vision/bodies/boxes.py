@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from hal.compiled import compiled
 from hal.types import FloatArray
 from vision.bodies.sizes import NEARER_INVERSE, SEEN_THROUGH_HEIGHT, SEEN_THROUGH_SHARE
-from vision.depth.depth_grid import DepthGrid, nearest_cell
+from vision.depth.cells import nearest_cell
+from vision.depth.depth_grid import DepthGrid
 from vision.depth.regions import Regions
 
 LOAD_GAP_M = 0.8  # maximum gap between a load and its carrier: the load may begin farther back

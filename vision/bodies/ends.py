@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from config.perception import DepthNoise
 from hal.compiled import compiled
 from hal.types import FloatArray
+from vision.depth.cells import nearest_cell
 from vision.depth.connected import IntGrid
-from vision.depth.depth_grid import BoolGrid, DepthGrid, FloatGrid, nearest_cell
+from vision.depth.depth_grid import BoolGrid, DepthGrid, FloatGrid
 
 _AROUND_M = 0.2  # cells within this distance belong to the fragment's body, which is about twice as wide
 # Gate on depth: the depth of a body, plus this many sigmas of the noise that grows with the squared depth.

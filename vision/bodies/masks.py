@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from hal.compiled import compiled
 from hal.types import FloatArray, Pose
+from vision.depth.cells import lattice_of, place_of
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import BoolGrid, DepthGrid, FloatGrid
 from vision.numerics.pose_axes import inner_vector
@@ -98,8 +99,7 @@ def _predicted(
     """As predict. old_pose: of the camera when the points were seen; pose: now."""
     height, width = grid.inverse_depth.shape
     result, nearest = np.zeros((height, width), np.int32), np.zeros((height, width), np.float32)
-    left, top = grid.x[0], grid.y[0]
-    per_column, per_row = np.float32(1.0) / (grid.x[1] - left), np.float32(1.0) / (grid.y[1] - top)
+    lattice = lattice_of(grid.x, grid.y)
     to_x, to_y, to_z = relative_rows(pose, old_pose)
     displacement_m = np.zeros(shift_m.shape, np.float32)  # in the camera's axes now
     for track in range(len(shift_m)):
@@ -117,8 +117,7 @@ def _predicted(
             coordinate_m(to_x, x, y, z) + displacement_m[track, 0],
             coordinate_m(to_y, x, y, z) + displacement_m[track, 1],
         )
-        column = (x * expected - left) * per_column + np.float32(0.5)
-        row = (y * expected - top) * per_row + np.float32(0.5)
+        column, row = place_of(x * expected, y * expected, lattice)
         if not (0.0 <= column < width and 0.0 <= row < height):
             continue
         i, j = int(row), int(column)

@@ -85,12 +85,6 @@ class DepthGrid:
         return result
 
 
-@inlined
-def nearest_cell(pixel: float, offset_px: float, step_px: float, count: int) -> int:
-    """The row of a pixel's v, or the column of its u, in a grid of count; clamped at the border."""
-    return min(max(int(np.rint((pixel - offset_px) / step_px)), 0), count - 1)
-
-
 def make_grid(frame: RgbdFrame, config: PerceptionConfig, mount: CameraMount | None) -> DepthGrid:
     """Sub-sample the depth of frame. Heights are None where mount is None.
 

@@ -8,22 +8,9 @@ import pytest
 from config.perception import PerceptionConfig
 from hal.types import CameraMount, RgbdFrame
 from tests.support.grids import CAMERA, COLUMNS, OFFSET_PX, ROWS, STEP_PX, grid_of
-from vision.depth.depth_grid import make_grid, nearest_cell
+from vision.depth.depth_grid import make_grid
 
 GRID = grid_of(np.random.default_rng(1).uniform(2.0, 4.0, (ROWS, COLUMNS)))
-
-
-def test_the_cell_of_an_image_point_is_the_nearest_one() -> None:
-    """As in the three files that ask for it (tests/unit/hal/test_compiled.py holds them together)."""
-    for cell in range(COLUMNS):
-        for off in (-0.4, 0.0, 0.4):
-            assert nearest_cell(OFFSET_PX + STEP_PX * (cell + off), OFFSET_PX, STEP_PX, COLUMNS) == cell
-
-
-def test_an_image_point_beside_the_grid_has_the_cell_at_its_rim() -> None:
-    far = 10.0 * STEP_PX * COLUMNS
-    assert nearest_cell(-far, OFFSET_PX, STEP_PX, COLUMNS) == 0
-    assert nearest_cell(far, OFFSET_PX, STEP_PX, COLUMNS) == COLUMNS - 1
 
 
 def test_the_points_of_cells_are_seen_in_these_cells() -> None:
