@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Annotated
+from typing import Annotated, TypeVar
 
 import cv2
 import numpy as np
@@ -21,6 +21,7 @@ from hal.types import CameraMount, DepthImage, FloatArray, Intrinsics, RgbdFrame
 from vision.depth.depth_mask import measurable_m
 from vision.depth.depth_noise import depth_sigma_of
 
+Reals = TypeVar("Reals", float, NDArray[np.float32], NDArray[np.float64])
 FloatGrid = NDArray[np.float32]
 BoolGrid = NDArray[np.bool_]
 # The same with the types that compiled steps need (hal/compiled.py): one value a cell; one a row or column.
@@ -83,6 +84,12 @@ class DepthGrid:
         np.multiply(self.y.take(rows), depth, out=result[1])
         result[2] = depth
         return result
+
+
+def floor_ray(y: Reals, pitch_rad: float) -> tuple[Reals, Reals]:
+    """Metres along the floor and metres down, per metre of depth, of rays y at z = 1, of any shape."""
+    cosine, sine = math.cos(pitch_rad), math.sin(pitch_rad)
+    return cosine - y * sine, y * cosine + sine
 
 
 def make_grid(frame: RgbdFrame, config: PerceptionConfig, mount: CameraMount | None) -> DepthGrid:
@@ -170,9 +177,7 @@ def _view(
     v = (offset + step * np.arange(shape[0])).astype(np.float32)
     x = (u - np.float32(camera.cx)) / np.float32(camera.fx)
     y = (v - np.float32(camera.cy)) / np.float32(camera.fy)
-    pitch_rad = 0.0 if mount is None else mount.pitch_rad
-    cosine, sine = np.float32(math.cos(pitch_rad)), np.float32(math.sin(pitch_rad))
-    view = _View(x, y, cosine - y * sine, y * cosine + sine)
+    view = _View(x, y, *floor_ray(y, 0.0 if mount is None else mount.pitch_rad))
     for values in (view.x, view.y, view.ahead, view.drop):
         values.setflags(write=False)
     return view

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from hal.compiled import compiled
 from hal.types import FloatArray
-from vision.depth.depth_grid import BoolGrid, DepthGrid, FloatGrid
+from vision.depth.depth_grid import BoolGrid, DepthGrid, FloatGrid, floor_ray
 from vision.depth.level_bands import LevelBands, level_bands
 from vision.depth.near_floor import FLOOR_EXCESS
 from vision.scene import NEVER_M, FreeSpace
@@ -127,15 +127,14 @@ def _floor_rows(
     rays_y: bytes, pitch_rad: float, camera_height_m: float, max_depth_m: float
 ) -> _FloorRows | None:
     """None if no ray meets the floor. Cached, since it is the same in every frame. rays_y: y of the grid."""
-    cos_pitch, sin_pitch = math.cos(pitch_rad), math.sin(pitch_rad)
-    y = np.frombuffer(rays_y, np.float32).astype(float)
-    drop = y * cos_pitch + sin_pitch
+    y: FloatArray = np.frombuffer(rays_y, np.float32).astype(float)
+    ahead, drop = floor_ray(y, pitch_rad)
     below = drop > camera_height_m / (1.5 * max_depth_m)
     rows = below.nonzero()[0][::-1]  # from the bottom of the image upwards, nearest floor first
     if len(rows) == 0:
         return None
     depth_m = camera_height_m / drop[rows]
-    forward_m = depth_m * (cos_pitch - y[rows] * sin_pitch)
+    forward_m = depth_m * ahead[rows]
     limit_m = (FLOOR_EXCESS * depth_m).astype(np.float32)
     # If even the uppermost row meets the floor, nothing beyond that is in view.
     horizon_m = max_depth_m if len(rows) < len(y) else forward_m[-1]

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.types import FloatArray
-from vision.depth.depth_grid import DepthGrid
+from vision.depth.depth_grid import DepthGrid, floor_ray
 
 BANDS = 80  # maximum number: over 60 degrees a band is 8 cm wide 6 m ahead
 _FAN_BANDS = 1.5  # columns are used as bands where this puts no cell off by more than this many bands
@@ -66,11 +66,10 @@ def _bands(
     cells = np.arange(bands * width) + columns * np.arange(rows)[:, None]
     cells[:, columns:] = -1
     if pitch_rad is not None:
-        cosine, sine = math.cos(pitch_rad), math.sin(pitch_rad)
-        tilt = cosine - 0.5 * (y0 + y1) * sine
+        tilt, _ = floor_ray(0.5 * (y0 + y1), pitch_rad)
         middle /= tilt
         half_width /= tilt
-        ahead = np.maximum(cosine - np.linspace(y0, y1, rows) * sine, _MIN_AHEAD)[:, None]
+        ahead = np.maximum(floor_ray(np.linspace(y0, y1, rows), pitch_rad)[0], _MIN_AHEAD)[:, None]
         x = x0 + step * column
         off = max(abs(x0), abs(float(x[-1]))) * float(np.abs(1.0 / ahead - 1.0 / tilt).max())
         if off > _FAN_BANDS * 2.0 * half_width:

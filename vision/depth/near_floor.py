@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.types import FloatArray
-from vision.depth.depth_grid import DepthGrid
+from vision.depth.depth_grid import DepthGrid, floor_ray
 
 FLOOR_EXCESS = 1.35  # a depth of more than this times that of the floor is a hole in it
 # Maximum depth at which missing data is excused; farther away it has another reason. sight.near_m of the
@@ -36,7 +36,7 @@ _FRAMES = 900
 
 def floor_depth_m(grid: DepthGrid) -> FloatArray:
     """(h,) depth at which the rows of grid meet the floor, inf above the horizon. Needs a known mounting."""
-    drop = grid.y * math.cos(grid.pitch_rad) + math.sin(grid.pitch_rad)
+    _, drop = floor_ray(grid.y, grid.pitch_rad)
     with np.errstate(divide="ignore"):
         return np.where(drop > 0.0, grid.camera_height_m / np.maximum(drop, 0.0), np.inf).astype(float)
 
