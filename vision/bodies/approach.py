@@ -31,6 +31,7 @@ from vision.bodies.tracks import Tracks
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import DepthGrid, FloatGrid
 from vision.depth.depth_noise import depth_sigma_of
+from vision.numerics import kalman
 from vision.numerics.relative_pose import NEAREST_M, Rows, coordinate_m, relative_rows
 
 # In the longer time a slow vehicle 6 m away comes nearer by twice the error. The shorter one shows jumps.
@@ -47,7 +48,6 @@ _CAMERA_M = 0.02  # error of the camera's own motion over the longer time
 _RANGE_SIGMAS = 2.0
 # Of static surfaces: 99 % stay below 2.7 in real recordings without odometry, and below 1.2 in rendered ones.
 _CLEAR_SIGMAS = 3.0
-_UNKNOWN_MPS = 100.0  # sigma in the directions that are not measured
 
 
 class Approach(NamedTuple):
@@ -208,9 +208,8 @@ def fuse(tracks: Tracks, approach: Approach, camera_m: FloatArray, dt_s: float) 
     direction = sight[use]
     # The time windows of successive frames overlap: a frame adds dt / window of a new measurement.
     variance = approach.sigma_mps[use] ** 2 * approach.lag_s / dt_s
-    along = direction[:, :, None] * direction[:, None, :]
-    noise = _UNKNOWN_MPS**2 * (np.eye(3) - along) + variance[:, None, None] * along
-    tracks.update_with_surface(use, -approach.mps[use, None] * direction, noise)
+    velocity = -approach.mps[use, None] * direction
+    tracks.update_with_surface(use, velocity, kalman.along_only(direction, variance))
 
 
 def approaching_s(so_far_s: FloatArray, approach: Approach, dt_s: float) -> FloatArray:

@@ -23,6 +23,7 @@ from vision.bodies.tracks import Tracks
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import DepthGrid
 from vision.depth.rims import NO_RIM, FreeRims, free_rims
+from vision.numerics import kalman
 from vision.numerics.relative_pose import NEAREST_M, Rows, coordinate_m, relative_rows
 
 # Rims are compared over 0.2 s, rounded to frames: a walking person moves by 0.2 m, five times the width of a
@@ -39,7 +40,6 @@ _QUANTUM = 0.29  # cells, sigma of a uniform distribution over one: all rows of 
 # percentile.
 _GAIT, _STEP_S = 0.15, 0.5
 _FLOOR_SIGMA_MPS = 0.03  # added sigma: error of the camera's own motion, as in vision/motion/line_of_sight.py
-_UNKNOWN_MPS = 100.0  # sigma in the directions that a rim does not measure
 
 
 class RimVelocities(NamedTuple):
@@ -248,7 +248,5 @@ def fuse(tracks: Tracks, rims: RimVelocities, dt_s: float) -> None:
     # of the outline lasts as long as a step.
     swing_mps = _GAIT * tracks.speed_mps[use] * tracks.moving[use]
     variance = (rims.sigma_mps[use] ** 2 * rims.lag_s[use] + swing_mps**2 * _STEP_S) / dt_s
-    along = direction[:, :, None] * direction[:, None, :]
-    noise = _UNKNOWN_MPS**2 * (np.eye(3) - along) + variance[:, None, None] * along
     velocity = rims.mps[use, None] * direction
-    tracks.update_with_surface(use, velocity, noise)
+    tracks.update_with_surface(use, velocity, kalman.along_only(direction, variance))

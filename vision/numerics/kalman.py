@@ -14,6 +14,7 @@ _UNKNOWNS = 6  # position, then velocity
 _MEASURED = 3  # entries measured at once: either position or velocity
 POSITION, VELOCITY = 0, 3  # index of the first entry of each in a state
 _NOWHERE = np.zeros(3)
+_UNKNOWN_MPS = 100.0  # standard deviation of a velocity in directions in which it is not measured
 
 
 def predict(
@@ -72,6 +73,16 @@ def reset_position(
     new_covariance[:, :3, :3] = noise
     new_covariance[:, :3, 3:] = new_covariance[:, 3:, :3] = 0.0
     return new_state, new_covariance
+
+
+def along_only(direction: FloatArray, variance: FloatArray) -> FloatArray:
+    """(K, 3, 3) covariance of velocities that are measured along one direction each, unit vectors (K, 3).
+
+    variance (K,): along it, (m/s)^2.
+    """
+    along = direction[:, :, None] * direction[:, None, :]
+    result: FloatArray = _UNKNOWN_MPS**2 * (np.eye(3) - along) + variance[:, None, None] * along
+    return result
 
 
 def forget_velocity(state: FloatArray, covariance: FloatArray, index: Integers, sigma_mps: float) -> None:
