@@ -10,6 +10,7 @@ from config.decision import DecisionConfig
 from config.robot import Robot
 from controller.decision.bodies import Bodies, no_bodies
 from controller.governor.ground import GroundMemory
+from hal.geometry import body_in_floor
 from hal.types import CameraMount, PlanarPose
 from tests.support.floor_bodies import box
 from vision.scene import FreeSpace
@@ -168,8 +169,8 @@ def test_the_body_stands_on_free_floor() -> None:
     robot = Walkabout()
     robot.at(3.0, 1.0, 0.5)
     for ahead, left in ((0.5, 0.38), (0.5, -0.38), (-0.5, 0.38), (-0.5, -0.38), (0.0, 0.0)):
-        x_m = 3.0 + ahead * math.cos(0.5) - left * math.sin(0.5)
-        assert robot.free(x_m, 1.0 + ahead * math.sin(0.5) + left * math.cos(0.5))
+        x_m, y_m, _ = body_in_floor(PlanarPose(3.0, 1.0, 0.5)).apply(np.array([ahead, left, 0.0])).tolist()
+        assert robot.free(x_m, y_m)
 
 
 def test_memory_ends_with_the_way_made_and_with_time_where_asked() -> None:

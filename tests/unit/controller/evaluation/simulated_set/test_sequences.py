@@ -12,6 +12,7 @@ from controller.evaluation.simulated_set.scenes import Mover, build, side_by_sid
 from controller.evaluation.simulated_set.scripted_drive import SLIPPING, Knot, OdometryError, ScriptedDrive
 from controller.evaluation.simulated_set.sequences import Sequence, arc, sequences, straight
 from controller.evaluation.simulated_set.simulate import build_world
+from hal.geometry import body_in_floor
 
 EXACT = OdometryError(1.0, 1.0, 0.0)
 ALL = sequences()
@@ -69,10 +70,9 @@ def test_a_mover_goes_through_its_point_at_its_time() -> None:
     sequence = Sequence("case", "tuning", arc(0.8, 0.4), (mover,), "hall", "paper", 9, EXACT)
     body = build_world(sequence).bodies(2.0)[0]
     robot = drive.pose(2.0)
-    c, s = math.cos(robot.heading_rad), math.sin(robot.heading_rad)
-    through = (robot.x_m + 4.0 * c - 0.5 * s, robot.y_m + 4.0 * s + 0.5 * c)
+    x_m, y_m, _ = body_in_floor(robot).apply(np.array([4.0, 0.5, 0.0])).tolist()
     # It takes some hundredths of a second to come up to speed.
-    assert (body.pose.x_m, body.pose.y_m) == pytest.approx(through, abs=0.05)
+    assert (body.pose.x_m, body.pose.y_m) == pytest.approx((x_m, y_m), abs=0.05)
     assert np.hypot(*body.velocity_mps) == pytest.approx(1.2)
     assert scenario.bodies[0].name == "person 1"
 
