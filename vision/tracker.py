@@ -9,6 +9,8 @@ filters (sightings, rim_motion, approach); fragments to tracks (adoption); veloc
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -32,7 +34,7 @@ from vision.bodies.adoption import adopt, inherited
 from vision.bodies.arrivals import Changes, ViewMemory, arriving
 from vision.bodies.few_fragments import bodies_needing_fragments
 from vision.bodies.judgement import judge
-from vision.bodies.motion_evidence import evidence_of
+from vision.bodies.motion_evidence import FrameMeasures, evidence_of
 from vision.bodies.regrouping import regrouped
 from vision.bodies.tracks import Tracks
 from vision.depth import connected, occlusion, regions
@@ -119,7 +121,7 @@ class Tracker:
         visible = occlusion.with_occlusion(grid, labels, measured)
         sightings.update_from_surfaces(tracks, detection, visible, noise)
         rims = self._rims.velocities(grid, labels, tracks, pose, now_ns)
-        nearing = approach.measure(grid, labels, tracks, self._free, pose, now_ns, noise)
+        nearing = approach.measure(tracks, detection, labels, self._free, noise)
         if detection.dt_s > 0:
             rim_motion.fuse(tracks, rims, detection.dt_s)
             approach.fuse(tracks, nearing, pose.translation_m, detection.dt_s)
@@ -131,7 +133,7 @@ class Tracker:
         if detection.dt_s > 0 and len(tracks):
             body = self._fuse_fragments(detection, owner, velocities)
             arrivals = masks.count_cells(whole, changes.arrived_cells, len(tracks))
-            self._judge(detection, body, arrivals, measured.cells, rims, nearing)
+            self._judge(detection, FrameMeasures(body, rims, nearing, arrivals, measured.cells))
         self._surfaces = masks.surfaces(grid, labels, tracks.ids, pose)
         return owner
 
@@ -227,30 +229,18 @@ class Tracker:
             tracks.update_with_fragments(use, velocity, noise)
         return body
 
-    def _judge(
-        self,
-        detection: Detection,
-        body: BodyVelocities,
-        arrivals: NDArray[np.intp],
-        cells: NDArray[np.intp],
-        rims: rim_motion.RimVelocities,
-        nearing: approach.Approach,
-    ) -> None:
-        """The verdict on each track, from all evidence of this frame.
-
-        body, rims, nearing: velocities by fragments, free rims and depth. arrivals, cells (T,): number of
-        newly arrived cells of each surface, and of all its cells.
-        """
+    def _judge(self, detection: Detection, measures: FrameMeasures) -> None:
+        """The verdict on each track, from all evidence of this frame."""
         tracks, dt_s, settings = self._tracks, detection.dt_s, self._config.motion
-        tracks.restless_s = _sustained(tracks.restless_s, limbs.restless(body), dt_s)
-        tracks.arriving_s = _sustained(tracks.arriving_s, arriving(arrivals, cells), dt_s)
-        tracks.approach_s = approach.approaching_s(tracks.approach_s, nearing, dt_s)
-        tracks.rim_s = rim_motion.one_way_s(tracks.rim_s, rims, settings.sigmas, dt_s)
+        arrives = arriving(measures.arrived, measures.cells)
+        tracks.restless_s = _sustained(tracks.restless_s, limbs.restless(measures.fragments), dt_s)
+        tracks.arriving_s = _sustained(tracks.arriving_s, arrives, dt_s)
+        tracks.approach_s = approach.approaching_s(tracks.approach_s, measures.approach, dt_s)
+        tracks.rim_s = rim_motion.one_way_s(tracks.rim_s, measures.rims, settings.sigmas, dt_s)
         advances = tracks.update_trailing_average(dt_s)
-        noise = self._config.depth_noise
         if detection.captured_ns - self._blurred_ns <= _OUT_OF_PLACE_NS:
-            arrivals = np.zeros_like(arrivals)
-        seen = evidence_of(tracks, detection, body, advances, arrivals, cells, rims, nearing, noise)
+            measures = replace(measures, arrived=np.zeros_like(measures.arrived))
+        seen = evidence_of(tracks, detection, measures, advances, self._config.depth_noise)
         verdict = judge(seen, tracks.evidence, tracks.moving, dt_s, settings)
         tracks.evidence, tracks.moving = verdict.evidence, verdict.moving
         tracks.confidence, tracks.surely_static = verdict.confidence, verdict.surely_static

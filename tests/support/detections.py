@@ -11,8 +11,7 @@ from hal.types import FloatArray, Pose
 from tests.support.grids import CAMERA, grid_of
 from tests.support.scenes import GOOD
 from vision.depth.depth_grid import DepthGrid
-from vision.detection import Detection
-from vision.motion.velocities import EndResiduals
+from vision.detection import Detection, unknown_residuals
 from vision.percept import Percept
 from vision.scene import EgoMotion
 from vision.tracker import Tracker
@@ -20,24 +19,6 @@ from vision.tracker import Tracker
 FRAME_NS = 33_333_333
 START_NS = 1_000_000_000
 AT_ORIGIN = Pose(np.eye(3), np.zeros(3))
-
-
-def no_ends() -> EndResiduals:
-    """The evidence of no fragments at all."""
-    none, pair, triple = np.empty(0), np.empty((0, 2)), np.empty((0, 3))
-    return EndResiduals(
-        static_m=triple,
-        ray=pair,
-        lag_s=none,
-        residual_m=pair,
-        covariance=triple,
-        depth_effect=pair,
-        depth_step_m=none,
-        depth_step_sigma_m=none,
-        depth_lag_s=none,
-        static_chi2=none,
-        usable=np.empty(0, np.bool_),
-    )
 
 
 def detection(
@@ -56,7 +37,7 @@ def detection(
         ends_px=np.empty((0, 2, 2), np.float32),
         near_m=np.empty((0, 2), np.float32),
         age_frames=np.empty(0, np.intp),
-        motion=no_ends(),
+        motion=unknown_residuals(0),
         pose=pose,
         ego_motion=EgoMotion(AT_ORIGIN, dt_s, "none" if first else source, 0.9, 0.001, 0.0005),
         health=GOOD,

@@ -31,6 +31,7 @@ from vision.bodies.tracks import Tracks
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import DepthGrid, FloatGrid
 from vision.depth.depth_noise import depth_sigma_of
+from vision.detection import Detection
 from vision.numerics import kalman
 from vision.numerics.relative_pose import NEAREST_M, Rows, coordinate_m, relative_rows
 
@@ -70,29 +71,23 @@ class Approach(NamedTuple):
 
 
 def measure(
-    grid: DepthGrid,
-    labels: IntGrid,
-    tracks: Tracks,
-    memory: ViewMemory,
-    pose: Pose,
-    now_ns: int,
-    noise: DepthNoise,
+    tracks: Tracks, detection: Detection, labels: IntGrid, memory: ViewMemory, noise: DepthNoise
 ) -> Approach:
     """Measure the tracks with the cells labels (h, w), track index + 1.
 
-    Only those that clearly come nearer count as measured. pose: of the camera.
+    Only those that clearly come nearer count as measured.
     """
     nothing = Approach(np.zeros(len(tracks)), np.full(len(tracks), np.inf), 0.0)
-    before, lately = (memory.view_of(now_ns, wanted_s) for wanted_s in _LOOK_BACK_S)
+    before, lately = (memory.view_of(detection.captured_ns, wanted_s) for wanted_s in _LOOK_BACK_S)
     asked = (tracks.extent_m.max(axis=1) <= LARGEST_M) & (tracks.cells >= EVEN_CELLS)
     cells = np.where(asked, tracks.cells, 0)
     if before is None or lately is None or not cells.any():
         return nothing
-    longer = _since(before, grid, labels, cells, pose, now_ns, noise)
+    longer = _since(before, detection, labels, cells, noise)
     clear = longer.sigmas > _CLEAR_SIGMAS
     if not clear.any():
         return nothing
-    shorter = _since(lately, grid, labels, np.where(clear, cells, 0), pose, now_ns, noise)
+    shorter = _since(lately, detection, labels, np.where(clear, cells, 0), noise)
     jumped = shorter.mps > _STEADY * longer.mps + shorter.sigma_mps
     counts = clear & np.isfinite(shorter.sigma_mps) & ~jumped
     return Approach(
@@ -101,20 +96,16 @@ def measure(
 
 
 def _since(
-    then: View,
-    grid: DepthGrid,
-    labels: IntGrid,
-    cells: NDArray[np.intp],
-    pose: Pose,
-    now_ns: int,
-    noise: DepthNoise,
+    then: View, detection: Detection, labels: IntGrid, cells: NDArray[np.intp], noise: DepthNoise
 ) -> Approach:
     """Measure by comparing with one view; mps is negative for what moves away.
 
     cells: number of cells of each track, 0 for tracks that are not asked for, (T,).
     """
-    lag_s = then.ago_s(now_ns)
-    mps, sigma_mps = _compared(grid, labels, cells, pose, then.pose, then.inverse, noise, lag_s)
+    lag_s = then.ago_s(detection.captured_ns)
+    mps, sigma_mps = _compared(
+        detection.grid, labels, cells, detection.pose, then.pose, then.inverse, noise, lag_s
+    )
     return Approach(mps, sigma_mps, lag_s)
 
 

@@ -29,6 +29,21 @@ _MIN_BORNE_OUT = 0.2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class FrameMeasures:
+    """What one frame measures of T tracks.
+
+    fragments, rims, approach: their velocities by their fragments, free rims and depth.
+    arrived, cells: number of newly arrived cells of each surface, and of all its cells, (T,).
+    """
+
+    fragments: BodyVelocities
+    rims: RimVelocities
+    approach: Approach
+    arrived: Integers
+    cells: Integers
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class MotionEvidence:
     """Evidence of T tracks, (T, ...) each unless stated; vectors along the axes of the fixed frame.
 
@@ -97,19 +112,15 @@ class MotionEvidence:
 def evidence_of(
     tracks: Tracks,
     detection: Detection,
-    body: BodyVelocities,
+    measures: FrameMeasures,
     advances: NDArray[np.bool_],
-    arrived: NDArray[np.intp],
-    cells: NDArray[np.intp],
-    rims: RimVelocities,
-    approach: Approach,
     noise: DepthNoise,
 ) -> MotionEvidence:
     """Gather the evidence of this frame; the filters of tracks have to be updated before.
 
-    body, rims, approach: velocities of the tracks by their fragments, free rims and depth.
-    advances, arrived, cells (T,): see MotionEvidence.
+    advances (T,): see MotionEvidence.
     """
+    body, rims, approach = measures.fragments, measures.rims, measures.approach
     rotation = detection.pose.rotation
     sight, distance_m = tracks.sight(detection.pose.translation_m)
     return MotionEvidence(
@@ -126,9 +137,9 @@ def evidence_of(
         agreement=body.agreement,
         restless=restless(body),
         restless_s=tracks.restless_s,
-        arrived=arrived,
+        arrived=measures.arrived,
         arriving_s=tracks.arriving_s,
-        cells=cells,
+        cells=measures.cells,
         size_m=tracks.extent_m.max(axis=1),
         velocity_measured_s=tracks.velocity_measured_s,
         rim_mps=rims.mps,

@@ -9,11 +9,10 @@ import pytest
 
 from config.perception import PerceptionConfig
 from hal.types import FloatArray, Pose
-from tests.support.detections import AT_ORIGIN, detection, no_ends, track
+from tests.support.detections import AT_ORIGIN, detection, track
 from tests.support.grids import CAMERA, grid_of, nearest, no_depth, plate, wall
 from tests.support.walker import FRAME_S, SPEED_MPS, moving, walker, way_m
 from vision.detection import unknown_residuals
-from vision.motion.velocities import EndResiduals
 from vision.percept import Percept
 from vision.tracker import Tracker
 
@@ -235,8 +234,6 @@ def owner_of(left_px: float, near_m: float, before: FloatArray) -> tuple[int, Pe
     """Obstacle of an upright fragment at left_px and near_m, in the third sight of before."""
     tracker = Tracker(PerceptionConfig(), 0.8, 0.05)
     ends = np.array([[[left_px, 60.0], [left_px, 110.0]]], np.float32)
-    motion = no_ends()
-    two = {name: np.ones((2, *getattr(motion, name).shape[1:])) for name in EndResiduals.__slots__}
     for frame in range(3):
         seen = replace(
             detection(grid_of(before), frame),
@@ -244,7 +241,7 @@ def owner_of(left_px: float, near_m: float, before: FloatArray) -> tuple[int, Pe
             ends_px=ends,
             near_m=np.full((1, 2), near_m, np.float32),
             age_frames=np.array([frame]),
-            motion=EndResiduals(**{**two, "usable": np.zeros(2, np.bool_)}),
+            motion=unknown_residuals(2),
         )
         percept = tracker.step(seen, None)
     return int(percept.fragments.obstacle_id[0]), percept

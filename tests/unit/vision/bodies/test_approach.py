@@ -10,7 +10,7 @@ import pytest
 
 from config.perception import DepthNoise
 from hal.types import FloatArray, Pose
-from tests.support.detections import AT_ORIGIN, FRAME_NS, track
+from tests.support.detections import AT_ORIGIN, FRAME_NS, detection, track
 from tests.support.grids import grid_of, labelled, nearest, no_depth, plate, wall
 from tests.support.judging import ALONG, one, rises
 from vision.bodies import approach
@@ -49,11 +49,12 @@ def measured(
         depth_m = nearest(body(time_s), *(other(time_s) for other in others))
         labels = labelled((depth_m > 0.0) & (depth_m == body(time_s)))
         grid = grid_of(depth_m + noise_m * rng.standard_normal(depth_m.shape) * (depth_m > 0.0))
-        memory.remember(grid, camera(time_s), k * FRAME_NS)
+        seen = detection(grid, k, camera(time_s))
+        memory.remember(grid, seen.pose, seen.captured_ns)
     tracks = tracks_of()
     tracks.cells[:] = np.count_nonzero(labels)
     tracks.extent_m[:] = size_m
-    return approach.measure(grid, labels, tracks, memory, camera(time_s), k * FRAME_NS, NOISE)
+    return approach.measure(tracks, seen, labels, memory, NOISE)
 
 
 def back(_: float) -> FloatArray:

@@ -9,14 +9,13 @@ import numpy as np
 import pytest
 
 from hal.types import FloatArray, Pose
-from tests.support.detections import FRAME_NS, START_NS, detection, no_ends
+from tests.support.detections import FRAME_NS, START_NS, detection
 from tests.support.grids import CAMERA, grid_of, no_depth
 from vision.bodies import report
 from vision.bodies.tracks import Tracks
 from vision.camera.lens import rotation_from_vector
-from vision.detection import Detection
+from vision.detection import Detection, unknown_residuals
 from vision.motion.least_squares import FragmentVelocities
-from vision.motion.velocities import EndResiduals
 
 FRAME = 30
 NOW_NS = START_NS + FRAME * FRAME_NS
@@ -79,13 +78,6 @@ def test_obstacles_are_told_in_the_axes_of_the_camera() -> None:
     assert (one.moving, one.score, one.fragments) == (True, 0.8, 7)
 
 
-def ends(usable: list[bool]) -> EndResiduals:
-    count = len(usable)
-    plain = no_ends()
-    values = {name: np.zeros((count, *getattr(plain, name).shape[1:])) for name in EndResiduals.__slots__}
-    return EndResiduals(**{**values, "usable": np.array(usable)})
-
-
 def two_fragments() -> Detection:
     pixels = np.array([[[100.0, 60.0], [120.0, 80.0]], [[159.5, 119.5], [159.5, 119.5]]], np.float32)
     depth = np.array([[3.0, 5.0], [2.0, np.nan]], np.float32)
@@ -95,7 +87,7 @@ def two_fragments() -> Detection:
         ends_px=pixels,
         near_m=depth,
         age_frames=np.array([4, 4]),
-        motion=ends([True, False, False, False]),
+        motion=replace(unknown_residuals(4), usable=np.array([True, False, False, False])),
     )
 
 
