@@ -5,13 +5,15 @@ Terms: vision/__init__.py.
 
 from __future__ import annotations
 
+from typing import Annotated, NamedTuple
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import DepthNoise
 from hal.compiled import compiled
-from hal.types import FloatArray
+from hal.types import Integers, Vector
 from vision.depth.cells import nearest_cell
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import BoolGrid, DepthGrid, FloatGrid
@@ -20,6 +22,23 @@ _AROUND_M = 0.2  # cells within this distance belong to the fragment's body, whi
 # Gate on depth: the depth of a body, plus this many sigmas of the noise that grows with the squared depth.
 _AGREE_M = 0.3
 _AGREE_SIGMAS = 2.0
+
+
+class _Window(NamedTuple):
+    """The part of the grid that holds all cells which can be close to an end, with M ends.
+
+    seeds: 0 in the cells of the ends, 1 elsewhere.
+    top, left: its first row and column.
+    rows, columns: of the ends within it, (M,).
+    end_m: their depths, (M,).
+    """
+
+    seeds: Annotated[NDArray[np.uint8], "uint8[:, ::1]"]
+    top: int
+    left: int
+    rows: Integers
+    columns: Integers
+    end_m: Vector
 
 
 def near_ends(
@@ -34,20 +53,17 @@ def near_ends(
 
     depth_m (N, 2): of the ends, NaN where it is not known.
     """
-    seeds, top, left, rows, columns, end_m = _seeds(
-        ends_px, depth_m, search_area, _AROUND_M * focal_px / grid.step_px, grid.offset_px, grid.step_px
-    )
-    if len(end_m) == 0:
+    reach_at_1m = _AROUND_M * focal_px / grid.step_px
+    window = _window(ends_px, depth_m, search_area, reach_at_1m, grid.offset_px, grid.step_px)
+    if len(window.end_m) == 0:
         return np.zeros(grid.depth_m.shape, np.bool_)
-    distance, label = cv2.distanceTransformWithLabels(seeds, cv2.DIST_L2, 3, labelType=cv2.DIST_LABEL_PIXEL)
+    distance, label = cv2.distanceTransformWithLabels(
+        window.seeds, cv2.DIST_L2, 3, labelType=cv2.DIST_LABEL_PIXEL
+    )
     return _within_reach(
+        window,
         np.asarray(distance, np.float32),
         np.asarray(label, np.int32),
-        top,
-        left,
-        rows,
-        columns,
-        end_m,
         grid.depth_m,
         search_area,
         np.float32(grid.step_px / (_AROUND_M * focal_px)),
@@ -56,18 +72,16 @@ def near_ends(
 
 
 @compiled("float32[:, :, :], float32[:, :], boolean[:, ::1], float64, float64, float64")
-def _seeds(
+def _window(
     ends_px: NDArray[np.float32],
     depth_m: NDArray[np.float32],
     search_area: BoolGrid,
     reach_at_1m: float,
     offset_px: float,
     step_px: float,
-) -> tuple[NDArray[np.uint8], int, int, NDArray[np.intp], NDArray[np.intp], FloatArray]:
-    """The window of the grid that holds all cells which can be close to an end.
+) -> _Window:
+    """The window of the ends whose depth is known; without ends if no cell of it is in search_area.
 
-    Returns an image of the window, 0 at the ends and 1 elsewhere; its top row and left column; row and column
-    of the ends within it, and their depths. No ends are returned if no cell of the window is search_area.
     reach_at_1m: _AROUND_M in cells at a distance of 1 m; it is less farther away.
     """
     height, width = search_area.shape
@@ -82,7 +96,7 @@ def _seeds(
                 count += 1
     rows, columns, end_m = rows[:count], columns[:count], end_m[:count]
     if count == 0:
-        return np.empty((0, 0), np.uint8), 0, 0, rows, columns, end_m
+        return _Window(np.empty((0, 0), np.uint8), 0, 0, rows, columns, end_m)
     reach = int(reach_at_1m / end_m.min()) + 2
     top, bottom = max(rows.min() - reach, 0), min(rows.max() + reach + 1, height)
     left, right = max(columns.min() - reach, 0), min(columns.max() + reach + 1, width)
@@ -93,34 +107,27 @@ def _seeds(
         rows[k] -= top
         columns[k] -= left
         seeds[rows[k], columns[k]] = 0
-    return seeds, top, left, rows[:count], columns[:count], end_m[:count]
+    return _Window(seeds, top, left, rows[:count], columns[:count], end_m[:count])
 
 
-@compiled(
-    "float32[:, ::1], int32[:, ::1], int64, int64, int64[::1], int64[::1], float64[::1], float32[:, ::1],"
-    "boolean[:, ::1], float32, float64"
-)
+@compiled(_Window, "float32[:, ::1], int32[:, ::1], float32[:, ::1], boolean[:, ::1], float32, float64")
 def _within_reach(
+    window: _Window,
     distance: FloatGrid,
     label: IntGrid,
-    top: int,
-    left: int,
-    rows: NDArray[np.intp],
-    columns: NDArray[np.intp],
-    end_m: FloatArray,
     depth_m: FloatGrid,
     search_area: BoolGrid,
     per_cell: np.float32,
     quadratic_per_m: float,
 ) -> BoolGrid:
-    """As near_ends. distance (in cells) to the nearest end, and label of that end: in the window of _seeds.
+    """As near_ends. distance (in cells) to the nearest end, and label of that end: in the window.
 
     per_cell: width of a cell at 1 m, as a share of _AROUND_M.
     """
-    result = np.zeros(search_area.shape, np.bool_)
+    result, top, left = np.zeros(search_area.shape, np.bool_), window.top, window.left
     nearest_m, agree_per_m = np.zeros(label.max() + 1), _AGREE_SIGMAS * quadratic_per_m
-    for k in range(len(end_m)):
-        nearest_m[label[rows[k], columns[k]]] = end_m[k]
+    for k in range(len(window.end_m)):
+        nearest_m[label[window.rows[k], window.columns[k]]] = window.end_m[k]
     for i in range(label.shape[0]):
         for j in range(label.shape[1]):
             if search_area[top + i, left + j]:

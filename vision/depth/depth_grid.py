@@ -26,6 +26,7 @@ FloatGrid = NDArray[np.float32]
 BoolGrid = NDArray[np.bool_]
 # The same with the types that compiled steps need (hal/compiled.py): one value a cell; one a row or column.
 CellValues = Annotated[FloatGrid, "float32[:, ::1]"]
+CellFlags = Annotated[BoolGrid, "boolean[:, ::1]"]
 CellRays = Annotated[FloatGrid, "float32[::1]"]
 
 # Noise of a cell's height relative to the noise that one pixel's depth would cause. A cell is the median of
@@ -62,8 +63,8 @@ class DepthGrid:
     offset_px: float
     depth_m: CellValues
     inverse_depth: CellValues
-    valid: BoolGrid
-    beyond: BoolGrid
+    valid: CellFlags
+    beyond: CellFlags
     x: CellRays
     y: CellRays
     forward_m: FloatGrid

@@ -74,17 +74,9 @@ def measure(grid: DepthGrid, labels: IntGrid, count: int) -> Regions:
     sides_visible accounts for the image border only, and overlapped is False: vision/depth/occlusion.py adds
     what hides a part.
     """
-    on_floor = grid.up is not None
+    up, height_m = (np.zeros(3), np.nan) if grid.up is None else (grid.up, grid.camera_height_m)
     cells, rows, bbox_px, position_m, extent_m, sides_visible, top_and_bottom_visible = _measured(
-        grid.inverse_depth,
-        labels,
-        count,
-        grid.x,
-        grid.y,
-        float(grid.step_px),
-        grid.offset_px,
-        grid.up if grid.up is not None else np.zeros(3),
-        grid.camera_height_m if on_floor else np.nan,
+        grid, labels, count, up, height_m
     )
     overlapped = np.zeros(count, np.bool_)
     return Regions(
@@ -116,26 +108,20 @@ def _edges(labels: IntGrid, count: int) -> tuple[Integers, Integers]:
 
 @inlined
 def _foot_px(
-    y: FloatGrid,
-    step_px: float,
-    offset_px: float,
-    up: FloatArray,
-    height_m: float,
-    middle_x: float,
-    depth_m: float,
-    bottom: int,
+    grid: DepthGrid, up: FloatArray, height_m: float, middle_x: float, depth_m: float, bottom: int
 ) -> float:
     """Image row where a part that nearly reaches the floor stands on it; -inf for other parts.
 
     The lowest hand's breadth of a body is taken for floor, because of the noise of depth. up (3,): the
     floor's normal. height_m: of the camera. middle_x: ray x of the part's middle. bottom: its last row.
     """
+    y, step_px = grid.y, grid.step_px
     # On the floor: camera height = - up . ray * depth.
     floor_y = (-height_m / depth_m - up[2] - up[0] * middle_x) / up[1]
     if not (floor_y - y[bottom]) * depth_m <= _FOOT_M + _FOOT_PER_METRE * depth_m:
         return -np.inf
-    row = float((floor_y - y[0]) / (y[1] - y[0])) * step_px + offset_px
-    return min(row, offset_px + (len(y) - 0.5) * step_px)
+    row = float((floor_y - y[0]) / (y[1] - y[0])) * step_px + grid.offset_px
+    return min(row, grid.offset_px + (len(y) - 0.5) * step_px)
 
 
 @inlined
@@ -170,29 +156,19 @@ def _sums(
     return sums, rims
 
 
-@compiled(
-    "float32[:, ::1], int32[:, ::1], int64, float32[::1], float32[::1], "
-    "float64, float64, float64[::1], float64"
-)
+@compiled(DepthGrid, "int32[:, ::1], int64, float64[::1], float64")
 def _measured(
-    inverse: FloatGrid,
-    labels: IntGrid,
-    count: int,
-    x: FloatGrid,
-    y: FloatGrid,
-    step_px: float,
-    offset_px: float,
-    up: FloatArray,
-    height_m: float,
+    grid: DepthGrid, labels: IntGrid, count: int, up: FloatArray, height_m: float
 ) -> tuple[Integers, Integers, FloatArray, FloatArray, FloatArray, Flags, Flags]:
     """cells and rows (R,), bbox_px (R, 4), position_m and extent_m (R, 3), sides_visible and
     top_and_bottom_visible (R,) of the parts.
 
     height_m: of the camera, NaN where the floor is not known. up (3,): the floor's normal.
     """
+    x, y, step_px, offset_px = grid.x, grid.y, grid.step_px, grid.offset_px
     (cells, edges), rows = _edges(labels, count), np.zeros(count, np.intp)
     sides_visible, top_and_bottom_visible = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
-    sums, rims = _sums(inverse, labels, x, y, edges)
+    sums, rims = _sums(grid.inverse_depth, labels, x, y, edges)
     bbox_px, position_m, extent_m = np.zeros((count, 4)), np.zeros((count, 3)), np.zeros((count, 3))
     for part in range(count):
         if cells[part] == 0:
@@ -208,7 +184,7 @@ def _measured(
         bbox_px[part, 2] = right * step_px + (offset_px + 0.5 * step_px)
         bbox_px[part, 3] = bottom * step_px + (offset_px + 0.5 * step_px)
         if not math.isnan(height_m):
-            foot_px = _foot_px(y, step_px, offset_px, up, height_m, mean_x, depth_m, bottom)
+            foot_px = _foot_px(grid, up, height_m, mean_x, depth_m, bottom)
             bbox_px[part, 3] = max(bbox_px[part, 3], foot_px)
         position_m[part] = mean_x * depth_m, mean_y * depth_m, depth_m
         # abs: of a surface that recedes outwards, the rim at the left may be farther right in space.

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from hal.compiled import compiled, inlined
 from hal.types import FloatArray, Matrix
 from vision.depth.connected import IntGrid
-from vision.depth.depth_grid import BoolGrid, DepthGrid, FloatGrid
+from vision.depth.depth_grid import DepthGrid
 
 LEFT, RIGHT = 0, 1
 NO_RIM = -1
@@ -46,36 +46,27 @@ class FreeRims:
 
 def free_rims(grid: DepthGrid, labels: IntGrid, count: int) -> FreeRims:
     """The free rims of the parts 1..count of labels (h, w)."""
-    farthest, farther = np.float32(1.0 / grid.range_m), np.float32(_FARTHER)
-    return FreeRims(*_free_rims(grid.inverse_depth, grid.beyond, labels, count, farthest, farther))
+    return FreeRims(*_free_rims(grid, labels, count))
 
 
 @inlined
-def _outermost(inverse: FloatGrid, beyond: BoolGrid, border: int, inwards: int) -> int:
+def _outermost(grid: DepthGrid, border: int, inwards: int) -> int:
     """The column at which the view of the depth camera ends; border, a side of the image, or further inwards.
 
     The view ends beside columns without any depth if these are a narrow band. A wide one is an empty part of
     the scene.
     """
-    width = inverse.shape[1]
+    width = grid.inverse_depth.shape[1]
     for band in range(int(_BAND_SHARE * width) + 1):
         j = border + inwards * band
-        if inverse[:, j].any() or beyond[:, j].any():
+        if grid.inverse_depth[:, j].any() or grid.beyond[:, j].any():
             return j
     return border
 
 
 @inlined
 def _is_free(
-    inverse: FloatGrid,
-    beyond: BoolGrid,
-    row: int,
-    rim: int,
-    outwards: int,
-    farthest: np.float32,
-    farther: np.float32,
-    first: int,
-    last: int,
+    grid: DepthGrid, row: int, rim: int, outwards: int, farthest: np.float32, first: int, last: int
 ) -> bool:
     """Whether what is next beside the cell at rim is farther, or too far away to be measured.
 
@@ -87,27 +78,21 @@ def _is_free(
         j += outwards
         if j < first or j > last:
             return False
-        beside = farthest if beyond[row, j] else inverse[row, j]
+        beside = farthest if grid.beyond[row, j] else grid.inverse_depth[row, j]
         if beside > 0.0:
-            return bool(inverse[row, rim] - beside > farther)
+            return bool(grid.inverse_depth[row, rim] - beside > np.float32(_FARTHER))
     return True
 
 
-@compiled("float32[:, ::1], boolean[:, ::1], int32[:, ::1], int64, float32, float32")
-def _free_rims(
-    inverse: FloatGrid,
-    beyond: BoolGrid,
-    labels: IntGrid,
-    count: int,
-    farthest: np.float32,
-    farther: np.float32,
-) -> tuple[NDArray[np.int32], FloatArray]:
-    """As free_rims. farthest: 1/m, at the end of the range. farther: 1/m, more than noise."""
+@compiled(DepthGrid, "int32[:, ::1], int64")
+def _free_rims(grid: DepthGrid, labels: IntGrid, count: int) -> tuple[NDArray[np.int32], FloatArray]:
+    """The fields of FreeRims."""
+    farthest = np.float32(1.0 / grid.range_m)
     height, width = labels.shape
     column = np.full((count, 2, height), NO_RIM, np.int32)
     sums, rows = np.zeros((count, 2)), np.zeros((count, 2))
     latest = np.empty(count, np.int32)  # the last cell of each part in this row; NO_RIM before its first
-    first, last = _outermost(inverse, beyond, 0, 1), _outermost(inverse, beyond, width - 1, -1)
+    first, last = _outermost(grid, 0, 1), _outermost(grid, width - 1, -1)
     for i in range(height):
         latest[:] = NO_RIM
         before = 0
@@ -128,8 +113,8 @@ def _free_rims(
                 rim = column[part, side, i]
                 if rim == NO_RIM:
                     continue
-                if _is_free(inverse, beyond, i, rim, 2 * side - 1, farthest, farther, first, last):
-                    sums[part, side] += inverse[i, rim]
+                if _is_free(grid, i, rim, 2 * side - 1, farthest, first, last):
+                    sums[part, side] += grid.inverse_depth[i, rim]
                     rows[part, side] += 1.0
                 else:
                     column[part, side, i] = NO_RIM
