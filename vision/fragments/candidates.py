@@ -16,7 +16,7 @@ from hal.types import FloatArray, RgbdFrame
 from vision.depth.depth_mask import SurfaceDepth, surface_depth
 from vision.depth.depth_noise import depth_sigma_of
 from vision.fragments.edges import GreyImage
-from vision.fragments.segments import SNAP_PX, snap_to_corners
+from vision.fragments.segments import SNAP_PX, smaller_eigenvalue, snap_to_corners
 
 _TAKEN_PX = 6  # size of a place: about half a search window, since closer ends would track the same pixels
 # Image noise of 3 grey levels adds this to both eigenvalues of the structure tensor over 7x7 px.
@@ -153,8 +153,8 @@ def _best_trackable(
     eigenvalue = np.full(len(segments_px), np.float32(np.inf))
     for n in range(len(segments_px)):
         for end in range(2):
-            middle, radius = _eigenvalues(tensor[n, end, 0], tensor[n, end, 1], tensor[n, end, 2])
-            eigenvalue[n] = min(eigenvalue[n], middle - radius)
+            uu, uv, vv = tensor[n, end, 0], tensor[n, end, 1], tensor[n, end, 2]
+            eigenvalue[n] = min(eigenvalue[n], smaller_eigenvalue(uu, uv, vv))
     wanted, count = np.empty(len(segments_px), np.intp), 0
     for n in np.argsort(-eigenvalue, kind="mergesort"):  # mergesort is stable
         first, second = _take(taken, segments_px[n, 0]), _take(taken, segments_px[n, 1])

@@ -161,10 +161,23 @@ def _tile(tiles: NDArray[np.int64], u: np.float32, v: np.float32, share: float) 
     return min(max(row, 0), tiles.shape[0] - 1), min(max(column, 0), tiles.shape[1] - 1)
 
 
+@inlined
+def _middle_tile(tiles: NDArray[np.int64], ends_px: NDArray[np.float32], tile_px: int) -> tuple[int, int]:
+    """Row and column of the tile of the middle between two ends (2, 2)."""
+    u, v = ends_px[0, 0] + ends_px[1, 0], ends_px[0, 1] + ends_px[1, 1]
+    return _tile(tiles, u, v, 0.5 / tile_px)
+
+
+@inlined
+def _no_tiles(height: int, width: int, tile_px: int) -> NDArray[np.int64]:
+    """0 for each tile of an image of height x width pixels."""
+    return np.zeros((-(-height // tile_px), -(-width // tile_px)), np.int64)
+
+
 @compiled("float32[:, :, ::1], int64, int64, int64")
 def _tile_counts(ends_px: NDArray[np.float32], tile_px: int, height: int, width: int) -> NDArray[np.int64]:
     """Number of ends in each tile of the image."""
-    counts = np.zeros((-(-height // tile_px), -(-width // tile_px)), np.int64)
+    counts = _no_tiles(height, width, tile_px)
     for n in range(len(ends_px)):
         for end in range(2):
             counts[_tile(counts, ends_px[n, end, 0], ends_px[n, end, 1], 1.0 / tile_px)] += 1
@@ -181,11 +194,10 @@ def _surplus(
     per_tile: int,
 ) -> NDArray[np.bool_]:
     """(N,) spare fragments with their middle in a tile that holds per_tile fragments before them."""
-    seen = np.zeros((-(-height // tile_px), -(-width // tile_px)), np.int64)
+    seen = _no_tiles(height, width, tile_px)
     surplus = np.zeros(len(ends_px), np.bool_)
     for n in range(len(ends_px)):
-        u, v = ends_px[n, 0, 0] + ends_px[n, 1, 0], ends_px[n, 0, 1] + ends_px[n, 1, 1]
-        tile = _tile(seen, u, v, 0.5 / tile_px)
+        tile = _middle_tile(seen, ends_px[n], tile_px)
         surplus[n] = spare[n] and seen[tile] >= per_tile
         seen[tile] += 1
     return surplus
@@ -214,8 +226,7 @@ def _wanted(
     """
     wanted, count, seen = np.empty(len(segments_px), np.intp), 0, np.zeros_like(counts)
     for n in range(len(segments_px)):
-        u, v = segments_px[n, 0, 0] + segments_px[n, 1, 0], segments_px[n, 0, 1] + segments_px[n, 1, 1]
-        tile = _tile(counts, u, v, 0.5 / tile_px)
+        tile = _middle_tile(counts, segments_px[n], tile_px)
         if seen[tile] < min(4 * (per_tile - counts[tile] // 2), _CANDIDATES_PER_TILE):
             wanted[count] = n
             count += 1
@@ -246,8 +257,7 @@ def _picked(
             far_room -= 1
         if not (whole[n] or (beyond and far_room >= 0)):
             continue
-        u, v = segments_px[n, 0, 0] + segments_px[n, 1, 0], segments_px[n, 0, 1] + segments_px[n, 1, 1]
-        tile = _tile(counts, u, v, 0.5 / tile_px)
+        tile = _middle_tile(counts, segments_px[n], tile_px)
         if seen[tile] < per_tile - counts[tile] // 2 and count < room:
             picked[count] = n
             count += 1
