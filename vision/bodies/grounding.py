@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import DepthNoise
-from hal.compiled import compiled, inlined
+from hal.compiled import compiled
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import DepthGrid, FloatGrid
 from vision.depth.regions import Regions, exchanged, measure
+from vision.numerics.order import median_of
 
 # Gate on depth: the depth of a body, plus this many sigmas of the noise that grows with the squared depth.
 _SAME_M = 0.3
@@ -55,16 +56,6 @@ def extend_to_floor(
     return result, exchanged(measured, measure(grid, result, len(mover)), grown)
 
 
-@inlined
-def _median_depth_m(depth_m: FloatGrid, labels: IntGrid, label: int, first: int, last: int) -> np.float32:
-    """Median depth of the cells with label in rows first to last; there has to be at least one."""
-    found_m = np.sort(depth_m[first : last + 1].ravel()[labels[first : last + 1].ravel() == label])
-    middle = len(found_m) // 2
-    odd = len(found_m) % 2 == 1
-    result: np.float32 = found_m[middle] if odd else np.float32(0.5) * (found_m[middle - 1] + found_m[middle])
-    return result
-
-
 @compiled("float32[:, ::1], float32[::1], int32[:, ::1], int64, boolean[::1], float64")
 def _below(
     depth_m: FloatGrid,
@@ -88,7 +79,8 @@ def _below(
     taken = np.empty(height * width, np.intp)
     if bottom < 0:
         return taken[:0]
-    own_m = _median_depth_m(depth_m, labels, label, bottom - (bottom - top + 1) // _LOWEST, bottom)
+    lowest_rows = slice(bottom - (bottom - top + 1) // _LOWEST, bottom + 1)
+    own_m = median_of(depth_m[lowest_rows].ravel()[labels[lowest_rows].ravel() == label])
     same_m = np.float32(_SAME_M + _SAME_SIGMAS * quadratic_per_m * own_m * own_m)
     count, lowest = 0, 0
     for j in range(width):

@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import FragmentSettings
-from hal.compiled import compiled, inlined
+from hal.compiled import compiled
 from vision.fragments import lucas_kanade
 from vision.fragments.edges import GreyImage
+from vision.numerics.order import median_of
 
 _EXPECTATION_PX = 2.0  # sigma of an expected position, after the median error of all ends has been removed
 _RIM_PX = 2  # of the image border: an end this close is about to leave the image
@@ -116,14 +117,6 @@ def _coarse(
     return result
 
 
-@inlined
-def _median(values: NDArray[np.float32]) -> np.float32:
-    """The median of values (N,)."""
-    ordered, middle = np.sort(values), len(values) // 2
-    upper: np.float32 = ordered[middle]
-    return upper if len(values) % 2 == 1 else np.float32(0.5) * (ordered[middle - 1] + upper)
-
-
 @compiled("float32[:, ::1], float32[:, ::1], bool_[::1], int64")
 def _by_common_error(
     found: NDArray[np.float32], guess: NDArray[np.float32], scouts: NDArray[np.bool_], every: int
@@ -134,7 +127,7 @@ def _by_common_error(
     """
     start = found.copy()
     for axis in range(2):
-        error = _median(found[::every, axis] - guess[::every, axis])
+        error = median_of(found[::every, axis] - guess[::every, axis])
         for n in range(len(guess)):
             if not scouts[n]:
                 start[n, axis] = guess[n, axis] + error
@@ -153,7 +146,7 @@ def _expected(
     expected, back_guess = np.empty_like(guess), np.empty_like(guess)
     doubtful = np.zeros(len(guess), np.bool_)
     for axis in range(2):
-        error = _median(there[:, axis] - guess[:, axis])
+        error = median_of(there[:, axis] - guess[:, axis])
         for n in range(len(guess)):
             expected[n, axis] = guess[n, axis] + error
             back_guess[n, axis] = there[n, axis] - (expected[n, axis] - pixels[n, axis])

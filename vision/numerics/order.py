@@ -27,6 +27,14 @@ def median(values: Reals) -> Reals:
     return result if values.shape[-1] % 2 else 0.5 * (ordered[..., middle - 1] + result)
 
 
+@inlined
+def median_of(values: NDArray[np.float32]) -> np.float32:
+    """Median of values (N,), N > 0, as of median(), for compiled steps."""
+    ordered, middle = np.sort(values), len(values) // 2
+    upper: np.float32 = ordered[middle]
+    return upper if len(values) % 2 == 1 else np.float32(0.5) * (ordered[middle - 1] + upper)
+
+
 def quantiles(values: RealArray, shares: Sequence[float]) -> tuple[float, ...]:
     """Quantiles of values (N,), N > 0, with linear interpolation: share 0 is the smallest, 1 the largest."""
     ordered = np.sort(values)
