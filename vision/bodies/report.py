@@ -11,7 +11,7 @@ from hal.compiled import compiled, inlined
 from hal.types import FloatArray, Intrinsics, Pose
 from vision.bodies.boxes import overlaps
 from vision.bodies.tracks import Tracks
-from vision.camera.lens import pixel_of, ray_through
+from vision.camera.lens import MIN_AHEAD_M, pixel_of, ray_through
 from vision.detection import Detection
 from vision.motion.least_squares import FragmentVelocities
 from vision.motion.velocities import EndResiduals
@@ -119,7 +119,7 @@ def _listed(
     """
     listed, bbox = np.zeros(len(local), np.bool_), tracks.bbox_px.copy()
     for t in range(len(local)):
-        x, y, z = local[t, 0], local[t, 1], max(local[t, 2], 0.1)
+        x, y, z = local[t, 0], local[t, 1], max(local[t, 2], MIN_AHEAD_M)
         moving, nearly_hidden, cells = tracks.moving[t], tracks.nearly_hidden[t], tracks.cells[t]
         spread = tracks.covariance[t]
         sigma_mps = math.sqrt(spread[3, 3] + spread[4, 4] + spread[5, 5])

@@ -14,6 +14,8 @@ from hal.types import FloatArray, Intrinsics
 # Images and grids are float32, geometry is float64; functions that read both take either.
 RealArray = NDArray[np.float32] | NDArray[np.float64]
 
+MIN_AHEAD_M = 0.1  # nearer points do not count as in front of the camera: their projection is meaningless
+
 
 def rays(pixels: RealArray, camera: Intrinsics) -> FloatArray:
     """(N, 3) points at z = 1 m behind pixels (N, 2)."""

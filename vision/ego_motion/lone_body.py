@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from hal.compiled import compiled, inlined
 from hal.types import FloatArray, Intrinsics, Pose
-from vision.ego_motion.pose_arrays import in_camera, turned_back
+from vision.camera.lens import MIN_AHEAD_M
+from vision.ego_motion.pose_arrays import as_array, in_camera, turned_back
 from vision.ego_motion.reprojection import View
 from vision.scene import Obstacle
 
@@ -24,7 +25,6 @@ _LARGEST_M = 3.0  # larger ones are walls and racks, which are static
 _ALONE_SHARE = 0.85
 # Margin around a body: the lines behind it end at its outline, and it may have moved since it was reported.
 _MARGIN_PX = 8.0
-_MIN_AHEAD_M = 0.1  # nearer points do not count as in front of the camera (robust_fit.py)
 
 
 def without_lone_body(view: View, start: Pose, obstacles: tuple[Obstacle, ...], camera: Intrinsics) -> View:
@@ -37,9 +37,7 @@ def without_lone_body(view: View, start: Pose, obstacles: tuple[Obstacle, ...], 
         return view
     focal, centre = np.array([camera.fx, camera.fy] * 2), np.array([camera.cx, camera.cy] * 2)
     boxes = (boxes_px + _MARGIN_PX * np.array([-1.0, -1.0, 1.0, 1.0]) - centre) / focal
-    pose = np.empty((3, 4))
-    pose[:, :3], pose[:, 3] = start.rotation, start.translation_m
-    others = _others(view.lines, view.seen, view.whitening, pose, boxes)
+    others = _others(view.lines, view.seen, view.whitening, as_array(start), boxes)
     if len(others) == len(view.seen):
         return view
     return View(view.lines[others], view.seen[others], view.whitening[others])
@@ -54,7 +52,7 @@ def _may_move_px(obstacles: tuple[Obstacle, ...]) -> FloatArray:
 @inlined
 def _told(line: FloatArray, seen: FloatArray, whitening: FloatArray, pose: FloatArray) -> float:
     """What a point tells of a turn about the camera's y axis: the inverse of its variance, 1/rad^2."""
-    z = max(in_camera(pose, line[0])[2], _MIN_AHEAD_M)
+    z = max(in_camera(pose, line[0])[2], MIN_AHEAD_M)
     dx, dy, dz = turned_back(pose, line[1, 0], line[1, 1], line[1, 2])
     x, y, own, mixed, other = seen[0], seen[1], whitening[0], whitening[1], whitening[2]
     across, down = own * (1.0 + x * x), mixed * (1.0 + x * x) + other * x * y

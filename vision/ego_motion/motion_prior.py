@@ -13,7 +13,7 @@ A prior has a mean (a Pose) and six standard deviations. It does not depend on t
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -72,7 +72,7 @@ def odometry_prior(motion: Pose, dt_s: float, settings: EgoMotionSettings) -> Mo
     tilt = settings.vibration_radps * dt_s + 0.1 * turn_rad
     way = settings.odometry_speed_ratio * displacement_m + settings.odometry_speed_mps * dt_s
     sigma = np.array([tilt, yaw, tilt, way, way, way])
-    return MotionPrior(motion, sigma, "odometry", True, slip_rad + _STEADY_RADPS * dt_s)
+    return MotionPrior(motion, sigma, "odometry", trusted=True, slip_rad=slip_rad + _STEADY_RADPS * dt_s)
 
 
 def steady_prior(last: Pose, last_dt_s: float, dt_s: float, settings: EgoMotionSettings) -> MotionPrior:
@@ -122,7 +122,7 @@ def rolling_prior(
             sigma_mps,
         ]
     )
-    return MotionPrior(motion, sigma * dt_s, "none", True)
+    return MotionPrior(motion, sigma * dt_s, "none", trusted=True)
 
 
 def with_gyro(
@@ -135,4 +135,4 @@ def with_gyro(
     sigma = prior.sigma.copy()
     sigma[:3] = settings.gyro_radps * dt_s
     motion = Pose(rotation_from_vector(turn_rad), prior.motion.translation_m)
-    return MotionPrior(motion, sigma, prior.source, prior.trusted, slip_rad=settings.gyro_radps * dt_s)
+    return replace(prior, motion=motion, sigma=sigma, slip_rad=settings.gyro_radps * dt_s)

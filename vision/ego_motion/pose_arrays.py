@@ -7,7 +7,14 @@ import math
 import numpy as np
 
 from hal.compiled import inlined
-from hal.types import FloatArray
+from hal.types import FloatArray, Pose
+
+
+def as_array(pose: Pose) -> FloatArray:
+    """(3, 4) rotation and translation of a pose."""
+    result = np.empty((3, 4))
+    result[:, :3], result[:, 3] = pose.rotation, pose.translation_m
+    return result
 
 
 @inlined

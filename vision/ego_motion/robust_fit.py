@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from hal.compiled import compiled, inlined
 from hal.types import FloatArray, Pose
-from vision.ego_motion.pose_arrays import back_to, in_camera, moved, turned_back
+from vision.camera.lens import MIN_AHEAD_M
+from vision.ego_motion.pose_arrays import as_array, back_to, in_camera, moved, turned_back
 from vision.ego_motion.reprojection import View
 
 _GATE_CHI2 = 9.21  # 99 % of static points, 2 degrees of freedom
@@ -25,7 +26,6 @@ _ITERATIONS = 6  # maximum: two that anneal, the others until convergence
 _ANNEAL = (32.0, 4.0)  # scale of the robust weights in the first iterations; 1 after them
 _CONVERGED_SIGMAS = 0.2  # a smaller step is negligible beside the uncertainty of the pose
 _STRAIGHT = 1e-3  # maximum motion (rad, m) for which the linearisation is exact to 0.01 px
-_MIN_AHEAD_M = 0.1  # nearer points do not count as in front of the camera
 _UNKNOWNS = 8  # rotation and translation (3 each), sweep about x and y
 _SWEEP = 6  # index of the first unknown of the sweep
 _RESIDUAL = _UNKNOWNS  # column of the residual, after those of the derivatives
@@ -56,10 +56,8 @@ class Fit:
 
 def fit(view: View, start: Pose, sigma: FloatArray) -> Fit:
     """Iteratively reweighted Gauss-Newton from start. sigma (8,): prior of the motion and the sweep."""
-    began = np.empty((3, 4))
-    began[:, :3], began[:, 3] = start.rotation, start.translation_m
     pose, sweep_rad, back, information, inliers, free, free_side, free_from_rad = _fitted(
-        view.lines, view.seen, view.whitening, began, np.ascontiguousarray(sigma)
+        view.lines, view.seen, view.whitening, as_array(start), np.ascontiguousarray(sigma)
     )
     return Fit(
         pose=Pose(pose[:, :3].copy(), pose[:, 3].copy()),
@@ -75,9 +73,7 @@ def fit(view: View, start: Pose, sigma: FloatArray) -> Fit:
 
 def misfits(view: View, found: Fit) -> FloatArray:
     """(N,) chi-square of each point at the pose and sweep of a fit; inf if it is behind the camera."""
-    pose = np.empty((3, 4))
-    pose[:, :3], pose[:, 3] = found.pose.rotation, found.pose.translation_m
-    return _misfits(view.lines, view.seen, view.whitening, pose, found.sweep_rad)
+    return _misfits(view.lines, view.seen, view.whitening, as_array(found.pose), found.sweep_rad)
 
 
 @inlined
@@ -86,7 +82,7 @@ def _shifted(lines: FloatArray, seen: FloatArray, start: FloatArray, sigma: Floa
     across, down, turn = np.empty(len(seen)), np.empty(len(seen)), np.zeros(6)
     for k in range(len(seen)):
         x, y, z = in_camera(start, lines[k, 0])
-        ahead = max(z, _MIN_AHEAD_M)
+        ahead = max(z, MIN_AHEAD_M)
         across[k], down[k] = seen[k, 0] - x / ahead, seen[k, 1] - y / ahead
     turn[0] = min(max(np.median(down), -3.0 * sigma[0]), 3.0 * sigma[0])
     turn[1] = min(max(-np.median(across), -3.0 * sigma[1]), 3.0 * sigma[1])
@@ -111,8 +107,8 @@ def _linearised(
     for k in range(count):
         x, y, z = in_camera(pose, lines[k, 0])
         dx, dy, dz = turned_back(pose, lines[k, 1, 0], lines[k, 1, 1], lines[k, 1, 2])
-        in_front[k] = z > _MIN_AHEAD_M
-        inverse = 1.0 / max(z, _MIN_AHEAD_M)
+        in_front[k] = z > MIN_AHEAD_M
+        inverse = 1.0 / max(z, MIN_AHEAD_M)
         x, y = x * inverse, y * inverse
         # If the camera turns by w and moves by v, a point p moves by -(w x p) - v in its frame.
         across, down = table[k, 0], table[k, 1]

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from hal.compiled import compiled
 from hal.types import FloatArray, Intrinsics, Pose
+from vision.camera.lens import MIN_AHEAD_M
 from vision.fragments.store import FragmentStore
 from vision.numerics.pose_axes import inner_vector
 from vision.scene import Fragments
 
 _UNKNOWN_M = 5.0  # assumed where depth is missing
-_MIN_AHEAD_M = 0.1  # lower bound of depth, so that a projection stays finite
 
 
 def known_motion(ids: NDArray[np.int64], previous: Fragments | None) -> tuple[NDArray[np.bool_], FloatArray]:
@@ -90,6 +90,6 @@ def _expected_px(
         for i in range(3):
             point[i] = point[i] - motion.translation_m[i] + displacement_m[fragment, i]
         x, y, z = inner_vector(motion, point)
-        inverse = 1.0 / max(z, _MIN_AHEAD_M)
+        inverse = 1.0 / max(z, MIN_AHEAD_M)
         result[k, 0], result[k, 1] = x * inverse * fx + cx, y * inverse * fy + cy
     return result

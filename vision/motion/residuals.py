@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from config.perception import DepthNoise
 from hal.compiled import compiled, inlined
 from hal.types import FloatArray, Intrinsics, Matrix, Pose
+from vision.camera.lens import MIN_AHEAD_M
 from vision.depth.depth_noise import depth_sigma_of
 from vision.ego_motion.camera_motion import CameraEstimate
 from vision.ego_motion.rolling_shutter import straight_rays
@@ -38,7 +39,6 @@ _MAX_SCALE = 8.0
 _STEPS_SHARE = 0.5  # of the sum of the flow variances of all frames: successive errors cancel in part
 _MIXED_ALONG_PX = 3.0  # minimum sigma along the fragment of an end where the edges of two surfaces cross
 _MIXED_ACROSS_PX = 0.3  # its sigma across the fragment: twice that of a clear end
-_MIN_AHEAD_M = 0.1  # nearer points do not count as in front of the camera
 _MIN_DETERMINANT = 1e-18  # m^4, of a covariance: a lower bound that avoids a division by 0
 
 _Covariance = tuple[float, float, float]  # xx, xy, yy
@@ -161,7 +161,7 @@ def _at_depth(direction: Coordinates, origin: Coordinates, depth_m: float) -> Co
 @inlined
 def _passing_px(near: Coordinates, far: Coordinates, camera: Intrinsics) -> tuple[float, float]:
     """How far apart in the image the same point of the anchor's image is now on the two surfaces."""
-    ahead, far_ahead = max(near[2], _MIN_AHEAD_M), max(far[2], _MIN_AHEAD_M)
+    ahead, far_ahead = max(near[2], MIN_AHEAD_M), max(far[2], MIN_AHEAD_M)
     return (
         (far[0] / far_ahead - near[0] / ahead) * camera.fx,
         (far[1] / far_ahead - near[1] / ahead) * camera.fy,
@@ -240,7 +240,7 @@ def _residuals(
         near_effect = by_x * sigma_m, by_y * sigma_m
         near_chi2 = _squared_sigmas(near_residual, (xx, xy, yy), near_effect)
         # On the far surface the same pixels span more metres.
-        wider = (far[2] / max(near[2], _MIN_AHEAD_M)) ** 2
+        wider = (far[2] / max(near[2], MIN_AHEAD_M)) ** 2
         far_sigma_m = depth_sigma_of(depths.far_m[k], noise.floor_m, noise.quadratic_per_m)
         far_effect = by_x * far_sigma_m, by_y * far_sigma_m
         far_chi2 = _squared_sigmas(_residual_m(seen, far), (xx * wider, xy * wider, yy * wider), far_effect)
@@ -253,5 +253,5 @@ def _residuals(
         # An end that is where a static far surface would have it tells nothing about the near surface.
         behind = near_chi2 > STATIC_END_CHI2 and far_chi2 <= STATIC_END_CHI2
         measured = math.isfinite(near_residual[0] + near_residual[1])
-        usable[k] = near[2] > _MIN_AHEAD_M and measured and not behind
+        usable[k] = near[2] > MIN_AHEAD_M and measured and not behind
     return static_m, ray, residual_m, covariance, effect, chi2, usable
