@@ -10,8 +10,7 @@ from vision.scene import Fragments, Scene
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Percept:
-    """scene, fragments: of one frame. needs_fragments: bodies on which more fragments are to be searched
-    for."""
+    """scene, fragments: of one frame. needs_fragments: bodies on which the next frame looks for more."""
 
     scene: Scene
     fragments: Fragments

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from config.perception import DepthNoise
 from hal.compiled import compiled, inlined
 from hal.types import FloatArray, Pose, Vector
-from vision.bodies.arrivals import CELL_NOISE_OVER_TIME, View, ViewMemory
+from vision.bodies.arrivals import CELL_NOISE_OVER_TIME, EarlierView, ViewMemory
 from vision.bodies.proof_rules import EVEN_CELLS, LARGEST_M
 from vision.bodies.tracks import Tracks
 from vision.depth.connected import IntGrid
@@ -96,7 +96,7 @@ def measure(
 
 
 def _since(
-    then: View, detection: Detection, labels: IntGrid, cells: NDArray[np.intp], noise: DepthNoise
+    then: EarlierView, detection: Detection, labels: IntGrid, cells: NDArray[np.intp], noise: DepthNoise
 ) -> Approach:
     """Measure by comparing with one view; mps is negative for what moves away.
 

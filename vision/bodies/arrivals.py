@@ -57,7 +57,7 @@ def arriving(arrived: NDArray[np.intp], cells: NDArray[np.intp]) -> NDArray[np.b
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class View:
+class EarlierView:
     """What was seen a moment ago.
 
     pose: of the camera in the fixed frame.
@@ -98,7 +98,7 @@ class ViewMemory:
 
     def __init__(self, noise: DepthNoise) -> None:
         self._noise = noise
-        self._views: list[View] = []
+        self._views: list[EarlierView] = []
 
     def clear(self) -> None:
         """Forget all views: their poses cannot be compared with those to come."""
@@ -148,11 +148,11 @@ class ViewMemory:
         # Where the measured depth is beyond the range, space was seen free up to the range, no farther.
         nearest[grid.beyond] = np.float32(1.0 / grid.range_m)
         cv2.dilate(nearest, NEIGHBOURHOOD, nearest)
-        self._views.append(View(now_ns, pose, nearest, grid.inverse_depth))
+        self._views.append(EarlierView(now_ns, pose, nearest, grid.inverse_depth))
         horizon_ns = now_ns - int(1e9 * _KEPT_FOR_S)
         self._views = [view for view in self._views if view.stamp_ns >= horizon_ns]
 
-    def view_of(self, now_ns: int, wanted_s: float) -> View | None:
+    def view_of(self, now_ns: int, wanted_s: float) -> EarlierView | None:
         """The view closest to wanted_s ago, if there is one within 0.5 to 1.5 times of it."""
         best, gap = None, (_OLDEST - 1.0) * wanted_s
         for view in self._views:

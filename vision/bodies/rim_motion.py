@@ -64,7 +64,9 @@ class RimVelocities(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _View:
+class _SeenRims:
+    """The free rims of the tracks track_id (T,) as seen from pose, the camera's, at stamp_ns."""
+
     stamp_ns: int
     track_id: NDArray[np.int64]
     rims: FreeRims
@@ -76,7 +78,7 @@ class RimMemory:
 
     def __init__(self, fastest_mps: float) -> None:
         self._fastest_mps = fastest_mps  # no body is faster
-        self._views: list[_View] = []
+        self._views: list[_SeenRims] = []
 
     def clear(self) -> None:
         """Forget all rims: the poses of their views cannot be compared with those to come."""
@@ -89,7 +91,7 @@ class RimMemory:
 
         Call clear first where pose cannot be compared with those before.
         """
-        now = _View(now_ns, tracks.ids, free_rims(grid, labels, len(tracks)), pose)
+        now = _SeenRims(now_ns, tracks.ids, free_rims(grid, labels, len(tracks)), pose)
         self._views = [view for view in self._views if now_ns - view.stamp_ns <= _LOOK_BACK_NS]
         compared = [view for view in self._views if now_ns - view.stamp_ns >= _SHORTEST_NS]
         self._views.append(now)
@@ -100,7 +102,7 @@ class RimMemory:
             self._since(compared[0], now, grid, tracks), self._since(compared[-1], now, grid, tracks)
         )
 
-    def _since(self, then: _View, now: _View, grid: DepthGrid, tracks: Tracks) -> RimVelocities:
+    def _since(self, then: _SeenRims, now: _SeenRims, grid: DepthGrid, tracks: Tracks) -> RimVelocities:
         """Measure the tracks by comparing two views."""
         lag_s = (now.stamp_ns - then.stamp_ns) * 1e-9
         track = tracks.index_of(then.track_id)

@@ -112,7 +112,7 @@ def make_grid(frame: RgbdFrame, config: PerceptionConfig, mount: CameraMount | N
     # The median of raw depths is that of their inverses too, and integers are sorted faster.
     middle = np.asarray(cv2.medianBlur(raw, 5), np.uint16)
     inverse, depth_m = _smoothed(raw, middle, scale_m)
-    view = _view(frame.intrinsics, mount, depth_m.shape, step, offset)
+    rays = _directions(frame.intrinsics, mount, depth_m.shape, step, offset)
     grid = DepthGrid(
         step_px=step,
         offset_px=offset,
@@ -120,8 +120,8 @@ def make_grid(frame: RgbdFrame, config: PerceptionConfig, mount: CameraMount | N
         inverse_depth=inverse,
         valid=valid,
         beyond=beyond,
-        x=view.x,
-        y=view.y,
+        x=rays.x,
+        y=rays.y,
         forward_m=depth_m,
         height_m=None,
         height_sigma_m=None,
@@ -130,15 +130,15 @@ def make_grid(frame: RgbdFrame, config: PerceptionConfig, mount: CameraMount | N
         up=None,
         range_m=range_m,
     )
-    return grid if mount is None else _with_floor(grid, view, mount, config.depth_noise)
+    return grid if mount is None else _with_floor(grid, rays, mount, config.depth_noise)
 
 
-def _with_floor(grid: DepthGrid, view: _View, mount: CameraMount, noise: DepthNoise) -> DepthGrid:
+def _with_floor(grid: DepthGrid, rays: _Directions, mount: CameraMount, noise: DepthNoise) -> DepthGrid:
     """grid with its distances along the floor and its heights over it."""
     forward_m, height_m, height_sigma_m = _over_floor(
         grid.depth_m,
-        view.ahead,
-        view.drop,
+        rays.ahead,
+        rays.drop,
         np.float32(mount.height_m),
         np.float32(noise.floor_m),
         np.float32(noise.quadratic_per_m),
@@ -155,7 +155,7 @@ def _with_floor(grid: DepthGrid, view: _View, mount: CameraMount, noise: DepthNo
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _View:
+class _Directions:
     """Ray directions of the cells, per metre of depth.
 
     x, y: as in DepthGrid, (w,) and (h,).
@@ -170,18 +170,18 @@ class _View:
 
 
 @lru_cache(maxsize=4)
-def _view(
+def _directions(
     camera: Intrinsics, mount: CameraMount | None, shape: tuple[int, int], step: int, offset: float
-) -> _View:
-    """The view of one camera; cached, since it is the same in every frame."""
+) -> _Directions:
+    """The directions of one camera; cached, since it is the same in every frame."""
     u = (offset + step * np.arange(shape[1])).astype(np.float32)
     v = (offset + step * np.arange(shape[0])).astype(np.float32)
     x = (u - np.float32(camera.cx)) / np.float32(camera.fx)
     y = (v - np.float32(camera.cy)) / np.float32(camera.fy)
-    view = _View(x, y, *floor_ray(y, 0.0 if mount is None else mount.pitch_rad))
-    for values in (view.x, view.y, view.ahead, view.drop):
+    rays = _Directions(x, y, *floor_ray(y, 0.0 if mount is None else mount.pitch_rad))
+    for values in (rays.x, rays.y, rays.ahead, rays.drop):
         values.setflags(write=False)
-    return view
+    return rays
 
 
 @inlined
@@ -273,7 +273,7 @@ def _over_floor(
 ) -> tuple[FloatGrid, FloatGrid, FloatGrid]:
     """forward_m, height_m and height_sigma_m of cells with depth_m (h, w).
 
-    ahead, drop (h,): see _View. floor_m, quadratic_per_m: depth noise.
+    ahead, drop (h,): see _Directions. floor_m, quadratic_per_m: depth noise.
     """
     forward_m, height_m = np.empty(depth_m.shape, np.float32), np.empty(depth_m.shape, np.float32)
     height_sigma_m = np.empty(depth_m.shape, np.float32)
