@@ -41,7 +41,7 @@ class Exposures:
                 return
             taken_ns[topic], found = _read(bag, metadata)
             clocks |= found
-        if len(clocks) == 1:
+        if len(clocks) == 1 and all(taken_ns.values()):
             self.clock = clocks.pop()
             self._taken_ns = taken_ns
             self._late_ns = {

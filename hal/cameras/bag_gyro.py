@@ -80,7 +80,7 @@ def _track(bag: BagFile, topic: str, camera: ColourCamera, transforms: StaticTra
         frame, rate = frame_name(message.header.frame_id), message.angular_velocity
         stamps_ns.append(exposures.stamp_ns(topic, message))
         rates.append((rate.x, rate.y, rate.z))
-    rates_radps = np.array(rates, np.float64)
+    rates_radps = np.array(rates, np.float64).reshape(-1, 3)
     if not np.isfinite(rates_radps).all():
         raise BadRecording(
             f"{bag.path}: {topic}: holds readings that are not finite; leave it out: --no-gyro"

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from hal.cameras.bag_exposures import Exposures
 from hal.cameras.bag_file import BagFile
 from hal.cameras.bag_realsense import metadata_topic, time_in_metadata
 from hal.cameras.bag_replay import BagReplay
+from hal.errors import BadRecording
 from tests.support.bags import (
     ALIGNED,
     ALIGNED_INFO,
@@ -126,6 +128,36 @@ def test_a_gyro_of_another_clock_is_not_used(tmp_path: Path) -> None:
     replay = BagReplay(viewer_bag(tmp_path, gyro=[text(k, "System Time") for k in range(6)]))
     assert replay.gyro is None
     assert any("(System Time, Hardware Clock)" in note for note in replay.notes)
+
+
+def damaged(monkeypatch: pytest.MonkeyPatch, stream: str) -> None:
+    """Nothing of this stream but its images can be read."""
+    read = BagFile.stamped_messages
+
+    def messages(bag: BagFile, names: Collection[str]) -> Iterator[tuple[str, int, Any]]:
+        if any(name.startswith(stream) and "image/data" not in name for name in names):
+            raise BadRecording("is damaged from here on")
+        yield from read(bag, names)
+
+    monkeypatch.setattr(BagFile, "stamped_messages", messages)
+
+
+def test_where_the_metadata_of_a_stream_are_lost_the_headers_count(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = viewer_bag(tmp_path)
+    damaged(monkeypatch, f"{DEPTH_STREAM}/image/metadata")
+    assert times_ms(path) == [30.0, 74.333, 99.667]
+
+
+def test_a_gyro_of_which_nothing_can_be_read_gives_no_readings(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = viewer_bag(tmp_path, gyro=["timestamp=1;"] * 6, colour=["?"] * 3)
+    damaged(monkeypatch, GYRO_STREAM)
+    replay = BagReplay(path)
+    assert replay.gyro is not None
+    assert (len(replay.gyro), len(read_all(replay)), replay.gyro.missed) == (0, 3, 3)
 
 
 def test_the_viewer_s_own_recording(tmp_path: Path) -> None:
