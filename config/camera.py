@@ -52,6 +52,12 @@ class ReplayCameraConfig(Section):
         description="bags: topic of the gyro, if it is not found automatically",
     )
 
+    @model_validator(mode="after")
+    def _gyro_or_no_topic(self) -> Self:
+        if self.gyro_topic is not None and not self.gyro:
+            raise ValueError("gyro_topic has no effect with gyro: false; leave one out")
+        return self
+
     @property
     def edge_tangents(self) -> None:
         """See SimulatedCameraConfig: only the recording knows, once it is open."""

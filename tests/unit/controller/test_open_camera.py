@@ -3,25 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 
 from config.app import load_app
-from config.loader import CONFIG_DIR
+from config.loader import CONFIG_DIR, ConfigError
 from controller.build import open_camera
 from hal.api import FrameSource
+from hal.cameras.tum_writer import TumWriter
 from hal.clocks import NS_PER_S, SimulatedClock
 from hal.errors import BadRecording
-from tests.support.bags import ALIGNED, COLOUR, Entry, Ros, camera_entries, small_bag, write_bag
+from hal.types import GyroSamples
+from tests.support.bags import ALIGNED, COLOUR, COLOUR_FRAME, Entry, Ros, camera_entries, small_bag, write_bag
 from tests.support.recordings import small_frame, write_recording
 
+GYROS = (("base", 1.0), ("arm", 2.0))
 TOPICS = {"colour_topic": COLOUR, "depth_topic": ALIGNED}
 
 
 def recorded_camera(
-    record: Callable[[Path], Path], folder: Path, clock: SimulatedClock, **keys: str
+    record: Callable[[Path], Path], folder: Path, clock: SimulatedClock, **keys: str | bool
 ) -> FrameSource:
     (folder / "recorded").mkdir()
     recording = record(folder / "recorded")
@@ -64,3 +69,54 @@ def test_which_of_two_recorded_cameras_is_asked_for(tmp_path: Path) -> None:
 def test_a_folder_has_no_topics(tmp_path: Path) -> None:
     with pytest.raises(BadRecording, match="is no ROS bag, so it has no topics"):
         recorded_camera(write_recording, tmp_path, SimulatedClock(), **TOPICS)
+
+
+def with_two_gyros(folder: Path) -> Path:
+    """Readings of the base turn about x at 1 rad/s, of its arm at 2; both have the axes of the camera."""
+
+    def entries(ros: Ros) -> list[Entry]:
+        frames = [small_frame(number) for number in range(4)]
+        first_ns = frames[0].captured_ns
+        return [
+            *(
+                (f"/{name}/imu", first_ns, ros.imu(first_ns, COLOUR_FRAME, (rate, 0.0, 0.0)))
+                for name, rate in GYROS
+            ),
+            *camera_entries(ros, frames),
+        ]
+
+    return write_bag(folder, "mcap", entries)
+
+
+def with_gyro(folder: Path) -> Path:
+    readings = GyroSamples(np.array([small_frame(0).captured_ns]), np.ones((1, 3)))
+    with TumWriter(folder) as writer:
+        writer.write(replace(small_frame(0), gyro=readings))
+    return folder
+
+
+@pytest.mark.parametrize(("name", "rate"), GYROS)
+def test_the_gyro_of_a_recorded_camera_is_chosen(name: str, rate: float, tmp_path: Path) -> None:
+    keys = {"gyro_topic": f"/{name}/imu"}
+    with recorded_camera(with_two_gyros, tmp_path, SimulatedClock(), **keys) as camera:
+        gyro = camera.read(1.0).gyro
+    assert gyro is not None
+    assert gyro.rates_radps[:, 0].tolist() == [rate]
+
+
+@pytest.mark.parametrize("record", [with_gyro, with_two_gyros])
+def test_a_recorded_gyro_that_is_not_wanted_is_left_out(
+    record: Callable[[Path], Path], tmp_path: Path
+) -> None:
+    with recorded_camera(record, tmp_path, SimulatedClock(), gyro=False) as camera:
+        assert camera.read(1.0).gyro is None
+
+
+def test_a_recorded_gyro_is_used(tmp_path: Path) -> None:
+    with recorded_camera(with_gyro, tmp_path, SimulatedClock()) as camera:
+        assert camera.read(1.0).gyro is not None
+
+
+def test_a_topic_of_a_gyro_that_is_not_wanted_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="gyro_topic has no effect with gyro: false"):
+        recorded_camera(with_two_gyros, tmp_path, SimulatedClock(), gyro=False, gyro_topic="/base/imu")
