@@ -32,10 +32,13 @@ _SAME_M = 0.6  # ends that are nearer to each other are the same corner
 # Width of the opening behind the corner, about a doorway. Until the front is past it, somebody may step out
 # of it beside the view, which is too narrow to see into an opening that is level with the robot.
 _OPENING_M = 1.0
-# Nearer than this ahead of the front, too little of the face is in view to tell that there is no corner.
+# Nearer than this ahead of the front, too little of the face is in view to tell that there is no corner by
+# not seeing one. That the face goes on can be seen.
 _SURE_M = 3.2
+# How far a corner may be from where it was noted.
+_PLACE_M = 0.3
 # A corner counts from this score on, and its score is not raised above the second: a scene that shows the
-# corner adds 2, and each scene takes 1 off.
+# corner adds 2, each scene takes 1 off, and one that shows that the face goes on takes 2 more off.
 _MIN_SCORE, _MAX_SCORE = 3, 8
 
 
@@ -94,6 +97,7 @@ class BlindCorners:
         for corner in self._corners:
             # Nearer than _SURE_M, a corner is not given up for not being seen.
             corner.score -= 1 if corner.s_m - front_s_m > _SURE_M else 0
+            corner.score -= 2 if _closed(surfaces, stands, corner.s_m, corner.left, corner.beside_m) else 0
         s_m, d_m, half_width_m = surfaces.s_m, surfaces.d_m, surfaces.half_width_m
         ends = _blind_ends(surfaces, stands, band_tan, front_s_m, self._beside_m)
         for end in ends.tolist():
@@ -154,6 +158,32 @@ def _ends_blind(points: SurfacesOnPath, first: int, last: int, inward: int, band
     if last < 0 or not points.s_m[last] - points.s_m[first] >= _FACE_M:
         return False
     return _passage_behind(points, last, last + inward, band_tan)
+
+
+@compiled(SurfacesOnPath, "boolean[:], float64, boolean, float64")
+def _closed(
+    points: SurfacesOnPath, stands: NDArray[np.bool_], s_m: float, left: bool, beside_m: float
+) -> bool:
+    """Whether no passage can begin at the corner at s_m: what stands there leaves no gap as wide.
+
+    A post or a box in front of a rack's goods hides a strip of them from afar, and the strip grows narrower on
+    the way there. left, beside_m: side of the corner, and its distance from the swept width.
+    """
+    begin_m, end_m = s_m - _PLACE_M, s_m + _PLACE_M + _PASSAGE_M
+    along_m = np.empty(len(points.bands) + 1)
+    along_m[0], count = end_m, 1
+    for k in range(len(points.bands)):
+        aside_m = abs(points.d_m[k]) - points.half_width_m[k]
+        at_face = stands[k] and 0.0 < aside_m < beside_m + _STEP_ASIDE_M
+        if at_face and (points.d_m[k] > 0.0) == left and begin_m < points.s_m[k] < end_m:
+            along_m[count] = points.s_m[k]
+            count += 1
+    last_m = begin_m
+    for next_m in np.sort(along_m[:count]):
+        if next_m - last_m > _PASSAGE_M:
+            return False
+        last_m = next_m
+    return True
 
 
 @compiled(SurfacesOnPath, "boolean[:], float64, float64, float64")

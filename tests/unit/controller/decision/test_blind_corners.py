@@ -102,3 +102,60 @@ def test_corner_by_noise_is_forgotten() -> None:
     aisle.end_m = 0.0
     aisle.look(0.5, times=9)
     assert aisle.corners.nearest(1.01) is None
+
+
+class Rack(Aisle):
+    """A rack without an end on the left, its goods 0.45 m beside the swept width, and in front of them a stack
+    of boxes from x = 4 to 6 m, 0.3 m beside it. With opening_m, so much of the rack behind the boxes is a way."""
+
+    def __init__(self, opening_m: float) -> None:
+        super().__init__(6.0, 0.3, 1)
+        self.goods_m, self.goes_on_m = HALF_WIDTH_M + 0.45, 6.0 + opening_m
+
+    def look(self, s_m: float, times: int = 1, stands: bool = True) -> None:
+        right = np.where(BEARING < 0.0, -BEARING, np.nan)  # to the left of the camera
+        before = s_m + CAMERA_M
+        boxes, goods = self.face_m / right, self.goods_m / right
+        on_boxes = (boxes + before > 4.0) & (boxes + before < self.end_m)
+        # Who looks into the way sees the side of the goods behind it.
+        goods = np.where(goods + before < self.end_m, goods, np.maximum(goods, self.goes_on_m - before))
+        forward = np.nan_to_num(np.where(on_boxes, boxes, goods), nan=9.0)
+        near = forward < 9.0
+        for _ in range(times):
+            surfaces = SurfacesOnPath(
+                bands=np.flatnonzero(near),
+                forward_m=forward[near],
+                s_m=before + forward[near],
+                d_m=(-BEARING * forward)[near],
+                half_width_m=np.full(near.sum(), HALF_WIDTH_M),
+            )
+            self.corners.look(surfaces, np.full(near.sum(), stands), 2.0 * EDGE_TAN / BANDS, s_m + FRONT_M)
+
+    def drive(self, from_m: float, to_m: float) -> bool:
+        """Whether there is a corner for a robot that has looked ten times in each metre of this way."""
+        for s_m in np.arange(from_m, to_m, 0.1):
+            self.look(float(s_m))
+        return self.corners.nearest(to_m + FRONT_M) is not None
+
+
+def test_boxes_that_hide_a_strip_of_a_rack_are_given_up_as_a_corner_once_the_rack_is_seen_to_go_on() -> None:
+    rack = Rack(opening_m=0.0)
+    assert rack.drive(0.5, 1.3)  # from afar a passage fits into what they hide
+    assert not rack.drive(1.3, 3.5)
+
+
+@pytest.mark.parametrize("opening_m", [0.9, 1.2, 2.0])
+def test_a_way_behind_the_boxes_remains_a_corner(opening_m: float) -> None:
+    rack = Rack(opening_m)
+    assert rack.drive(0.5, 1.3)
+    assert rack.drive(1.3, 3.5)
+    assert rack.drive(3.5, 6.0)
+    assert not rack.drive(6.0, 7.5)
+
+
+def test_movers_in_front_of_the_way_do_not_close_it() -> None:
+    rack = Rack(opening_m=1.2)
+    assert rack.drive(0.5, 3.0)
+    rack.goes_on_m = rack.end_m
+    rack.look(3.0, times=9, stands=False)
+    assert rack.corners.nearest(3.0 + FRONT_M) is not None
