@@ -166,8 +166,8 @@ def _closed(
 ) -> bool:
     """Whether no passage can begin at the corner at s_m: what stands there leaves no gap as wide.
 
-    A post or a box in front of a rack's goods hides a strip of them from afar, and the strip grows narrower on
-    the way there. left, beside_m: side of the corner, and its distance from the swept width.
+    A post or a box in front of a rack's goods hides a strip of them from afar, and the strip grows narrower
+    on the way there. left, beside_m: side of the corner, and its distance from the swept width.
     """
     begin_m, end_m = s_m - _PLACE_M, s_m + _PLACE_M + _PASSAGE_M
     along_m = np.empty(len(points.bands) + 1)

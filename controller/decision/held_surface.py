@@ -4,7 +4,8 @@ A surface that sinks below the view, rises above it or passes beside it is still
 wall beside the corridor leaves the view little by little: its nearest visible point recedes as fast as the
 robot drives. What vanishes while the robot stands has gone away; a sill that sank below the view before the
 robot came to rest has not. A surface that is seen as before, but belongs to a body now, has not left the view
-and is not held. Beside something that moves it may be a part of that, and is not held at rest.
+and is not held. Beside something that moves it may be a part of that, and is not held at rest. If it was only
+ever seen there, and beside the swept width, it is not held at all: it has moved on with what it is a part of.
 controller/decision/sight.py notes the nearest surface once a scene.
 """
 
@@ -14,6 +15,7 @@ import math
 from collections import deque
 
 from hal.clocks import NS_PER_S
+from hal.records import record
 
 SAME_SURFACE_M = 0.3  # how much farther along the path points of one surface may be
 # The median of this many scenes counts: one outlier must not brake; three frames are a tenth of a second.
@@ -27,6 +29,50 @@ _LASTS_NS = NS_PER_S // 2
 _LONGEST_NS = NS_PER_S // 10  # between two scenes, of the time that counts
 
 
+@record(frozen=True, slots=True)
+class Nearest:
+    """The nearest unexplained surface of one scene.
+
+    s_m: along the path; inf: there is none.
+    beside_mover: something moves beside it.
+    in_swept_width: the robot would touch it; otherwise it would only come too close to it.
+    """
+
+    s_m: float
+    beside_mover: bool = False
+    in_swept_width: bool = True
+
+
+class _Place:
+    """About where the nearest surface is, and how it has been seen since it is there."""
+
+    def __init__(self) -> None:
+        self._s_m, self._still_ns, self._before_ns = math.inf, 0, 0
+        self._passes = False
+
+    def note(self, steady_s_m: float, nearest: Nearest, captured_ns: int) -> None:
+        """steady_s_m: median of the last scenes."""
+        passes = nearest.beside_mover and not nearest.in_swept_width
+        if abs(steady_s_m - self._s_m) > SAME_SURFACE_M:
+            self._s_m, self._still_ns, self._passes = steady_s_m, 0, passes
+        elif not nearest.beside_mover:
+            self._still_ns += min(captured_ns - self._before_ns, _LONGEST_NS)
+        if self._is_at(nearest.s_m):
+            self._passes &= passes
+        self._before_ns = captured_ns
+
+    def lasts(self, s_m: float) -> bool:
+        """Whether one at s_m was the nearest, and about there, for some time without a mover beside it."""
+        return self._is_at(s_m) and self._still_ns >= _LASTS_NS
+
+    def passes(self, s_m: float) -> bool:
+        """Whether one at s_m was only ever seen beside the swept width, and with a mover beside it."""
+        return self._is_at(s_m) and self._passes
+
+    def _is_at(self, s_m: float) -> bool:
+        return abs(s_m - self._s_m) <= SAME_SURFACE_M
+
+
 class HeldSurface:
     """Call note() once a scene. All are path coordinates in metres; inf: none.
 
@@ -38,57 +84,42 @@ class HeldSurface:
         self._nearest: deque[float] = deque(maxlen=_FRAMES)
         self._closest_s_m = math.inf
         self._driving_s_m = self._lasting_s_m = math.inf  # held while the robot drives; held at rest, too
-        # Where the nearest one is, for how long without a mover beside it, and when the last scene was.
-        self._about_s_m, self._still_ns, self._before_ns = math.inf, 0, 0
+        self._place = _Place()
         self._seen_at_rest = False
 
     def note(
         self,
-        nearest_s_m: float,
+        nearest: Nearest,
         s_m: float,
         blind_s_m: float,
         captured_ns: int,
         standing: bool,
         explained_s_m: float = math.inf,
-        beside_mover: bool = False,
     ) -> None:
         """Take in the nearest surface of one scene.
 
         s_m: of the robot. blind_s_m: up to here surfaces may leave the view because the robot drives on.
         standing: the robot was at rest. explained_s_m: of the surface that is seen across the same way, but
-        belongs to a body; inf: none. beside_mover: something moves beside the nearest surface.
+        belongs to a body; inf: none.
         """
-        self._nearest.append(nearest_s_m)
+        self._nearest.append(nearest.s_m)
         steady = sorted(self._nearest)[len(self._nearest) // 2]
         receded = steady > self._closest_s_m + _RECEDES_M and self._closest_s_m < blind_s_m
-        explained = abs(explained_s_m - self._closest_s_m) <= SAME_SURFACE_M
-        receded &= not explained
+        gone = abs(explained_s_m - self._closest_s_m) <= SAME_SURFACE_M
+        gone |= receded and self._place.passes(self._closest_s_m)
         if standing:
             self._driving_s_m = math.inf
             self._forget_what_has_gone(steady)
-        elif receded:
+        elif receded and not gone:
             self._driving_s_m = min(self._driving_s_m, self._closest_s_m)
-            if self._lasts():
+            if self._place.lasts(self._closest_s_m):
                 self._lasting_s_m = min(self._lasting_s_m, self._closest_s_m)
         self._seen_at_rest &= standing
         self._forget_what_is_behind(s_m)
-        self._note_place(steady, captured_ns, beside_mover)
-        keeps = not standing and not explained and s_m < self._closest_s_m < blind_s_m
+        self._place.note(steady, nearest, captured_ns)
+        keeps = not standing and not gone and s_m < self._closest_s_m < blind_s_m
         self._closest_s_m = min(steady, self._closest_s_m) if keeps else steady
         self.s_m = min(steady, self._driving_s_m, self._lasting_s_m)
-
-    def _note_place(self, steady_s_m: float, captured_ns: int, beside_mover: bool) -> None:
-        """Note about where the nearest surface is, and for how long it has been there."""
-        if abs(steady_s_m - self._about_s_m) > SAME_SURFACE_M:
-            self._about_s_m, self._still_ns = steady_s_m, 0
-        elif not beside_mover:
-            self._still_ns += min(captured_ns - self._before_ns, _LONGEST_NS)
-        self._before_ns = captured_ns
-
-    def _lasts(self) -> bool:
-        """Whether the closest surface was the nearest, and about there, for some time."""
-        there = abs(self._closest_s_m - self._about_s_m) <= SAME_SURFACE_M
-        return there and self._still_ns >= _LASTS_NS
 
     def _forget_what_has_gone(self, steady_s_m: float) -> None:
         """Drop a lasting surface that was seen about its place during this standstill and is seen no more."""

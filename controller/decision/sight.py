@@ -17,7 +17,7 @@ from config.decision import DecisionConfig
 from controller.decision.blind_corners import BlindCorners, SurfacesOnPath
 from controller.decision.bodies import Bodies
 from controller.decision.corridor import BEYOND_RANGE_M, Corridor
-from controller.decision.held_surface import SAME_SURFACE_M, HeldSurface
+from controller.decision.held_surface import SAME_SURFACE_M, HeldSurface, Nearest
 from controller.decision.surfaces import Surfaces, seen_of
 from controller.decision.view_edges import MIN_TAN, assumed_free_m, may_be_above_view_within_m
 from hal.clocks import NS_PER_S
@@ -36,6 +36,7 @@ _LANES = 5  # points across the width of a cell
 _MAX_ABOVE_M = 3.0
 # Bodies explain a surface that was on no body before if they cover this share of its width.
 _EXPLAINED_SHARE = 0.8
+_CLEARANCE_ERROR_M = 0.05  # a surface is in the swept width if it is by more than this
 _BESIDE_MOVER_M = 1.0  # as close to a mover a surface may be a part of it, such as the rest of a vehicle
 
 
@@ -104,11 +105,12 @@ class Sight:
         if nearest_s < math.inf:
             self.surface_clearance_m = clearance_m
         counts, explained = in_corridor[on_path.bands], belongs.any(axis=1)
-        nearest = counts & ~explained & (on_path.s_m <= nearest_s + SAME_SURFACE_M)
-        explained_s = self._explained(on_path, counts & explained, nearest)
+        points = counts & ~explained & (on_path.s_m <= nearest_s + SAME_SURFACE_M)
+        explained_s = self._explained(on_path, counts & explained, points)
         blind_s_m = s_m + self._mount.forward_m + self._out_of_view_within_m
-        beside_mover = _beside_mover(surfaces.points_m[nearest], explained_by)
-        self._surface.note(nearest_s, s_m, blind_s_m, captured_ns, standing, explained_s, beside_mover)
+        beside_mover = _beside_mover(surfaces.points_m[points], explained_by)
+        nearest = Nearest(nearest_s, beside_mover, clearance_m < -_CLEARANCE_ERROR_M)
+        self._surface.note(nearest, s_m, blind_s_m, captured_ns, standing, explained_s)
         self._note_floor(free, pose, s_m, captured_ns, in_corridor)
 
     def _explained(self, on_path: SurfacesOnPath, explained: BoolArray, nearest: BoolArray) -> float:

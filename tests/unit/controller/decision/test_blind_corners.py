@@ -105,8 +105,8 @@ def test_corner_by_noise_is_forgotten() -> None:
 
 
 class Rack(Aisle):
-    """A rack without an end on the left, its goods 0.45 m beside the swept width, and in front of them a stack
-    of boxes from x = 4 to 6 m, 0.3 m beside it. With opening_m, so much of the rack behind the boxes is a way."""
+    """A rack without an end on the left, its goods 0.45 m beside the swept width, and boxes in front of them
+    from x = 4 to 6 m, 0.3 m beside it. With opening_m, so much of the rack behind the boxes is a way."""
 
     def __init__(self, opening_m: float) -> None:
         super().__init__(6.0, 0.3, 1)

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from controller.decision.held_surface import HeldSurface
+from controller.decision.held_surface import HeldSurface, Nearest
 
 FRAME_NS = 33_333_333
 BLIND_M = 1.5  # ahead of the robot, where surfaces may leave the view
@@ -36,10 +36,10 @@ class Drive:
             self._note(nearest_s_m, standing=True)
         return self.held.s_m
 
-    def on_beside_mover(self, nearest_s_m: float, frames: int) -> float:
+    def on_beside_mover(self, nearest_s_m: float, frames: int, in_swept_width: bool = True) -> float:
         for _ in range(frames):
             self.s_m += 0.04
-            self._note(nearest_s_m, standing=False, beside_mover=True)
+            self._note(nearest_s_m, False, beside_mover=True, in_swept_width=in_swept_width)
         return self.held.s_m
 
     def _note(
@@ -48,11 +48,13 @@ class Drive:
         standing: bool,
         explained_s_m: float = math.inf,
         beside_mover: bool = False,
+        in_swept_width: bool = True,
     ) -> None:
         self.frame += 1
         blind_s_m = self.s_m + BLIND_M
         now_ns = self.frame * FRAME_NS
-        self.held.note(nearest_s_m, self.s_m, blind_s_m, now_ns, standing, explained_s_m, beside_mover)
+        nearest = Nearest(nearest_s_m, beside_mover, in_swept_width)
+        self.held.note(nearest, self.s_m, blind_s_m, now_ns, standing, explained_s_m)
 
 
 def seen_until_below_the_view(frames_before: int) -> Drive:
@@ -92,6 +94,23 @@ def test_one_beside_a_mover_may_be_a_part_of_it_and_is_not_held_at_rest() -> Non
     drive.on_beside_mover(2.4, 28)
     assert drive.on(math.inf, 5) == pytest.approx(2.4)
     assert drive.rest(math.inf) == math.inf
+
+
+def test_one_beside_the_swept_width_that_was_only_seen_beside_a_mover_has_gone_with_it() -> None:
+    """The rear of a vehicle that has just crossed: no box covers it, and the robot passes behind it."""
+    drive = Drive()
+    drive.on(math.inf, 10)
+    assert drive.on_beside_mover(2.4, 18, in_swept_width=False) == pytest.approx(2.4)
+    assert drive.on(math.inf, 5) == math.inf
+
+
+@pytest.mark.parametrize("frames_alone", [1, 20])
+def test_one_beside_the_swept_width_that_was_seen_without_a_mover_is_held(frames_alone: int) -> None:
+    drive = Drive()
+    drive.on_beside_mover(2.4, 8, in_swept_width=False)
+    drive.on(2.4, frames_alone)
+    drive.on_beside_mover(2.4, 20 - frames_alone, in_swept_width=False)
+    assert drive.on(math.inf, 5) == pytest.approx(2.4)
 
 
 def test_one_that_was_there_before_a_mover_passed_it_is_held_at_rest() -> None:
