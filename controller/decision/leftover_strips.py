@@ -1,8 +1,10 @@
-"""Narrow strips that are the last visible parts of a mover that has left the view.
+"""Narrow strips that are the last visible parts of a mover that leaves the view, or the first of one that
+comes.
 
 As a mover is cut off at the edge of the view, what is still seen of it may become a track of its own, which
-is hardly measured and soon gone. controller/decision/out_of_view.py asks which of the bodies that it would
-keep are such strips: the mover is kept himself.
+is hardly measured and soon gone. The hand of somebody who comes in swings over the edge before he does.
+controller/decision/out_of_view.py asks which of the bodies that it would keep are such strips: the mover is
+kept himself, or seen.
 """
 
 from __future__ import annotations
@@ -19,10 +21,13 @@ from controller.decision.unseen_motion import (
     hardly_stood,
     velocities_agree,
 )
+from hal.types import FloatArray
 
 # A strip this near to a kept mover, across the view, may be a part of it. If it was judged standing, also
 # along the view: its place follows the edge of the view while the mover goes on.
 _REACH_M = 0.5
+# For so long the first strip and the mover may have been seen at the same time.
+_OVERLAP_S = 0.3
 
 
 def leftover_strips(bodies: Bodies, kept: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -42,3 +47,20 @@ def leftover_strips(bodies: Bodies, kept: NDArray[np.bool_]) -> NDArray[np.bool_
     reach_m = bodies.half_view_m + np.where(bodies.moving, 0.0, _REACH_M)
     beside = others.covers(bodies.xy_m, reach_m, _REACH_M)
     return np.asarray(strips & (beside & alike).any(axis=1))
+
+
+def first_strips(bodies: Bodies, since_s: FloatArray, seen: Bodies) -> NDArray[np.bool_]:
+    """(N,) which of the bodies, last seen since_s ago (N,), were the first visible parts of seen movers.
+
+    They moved, were seen for MIN_TRACKED_S at most, and a mover has come into view near their place since. It
+    has been seen for longer, so that its velocity is known.
+    """
+    strips = bodies.moving & (bodies.tracked_s <= MIN_TRACKED_S)
+    strips &= bodies.half_across_m < MIN_MOVER_HALF_WIDTH_M
+    known = seen.moving & (seen.tracked_s > MIN_TRACKED_S)
+    if not (np.count_nonzero(strips) and np.count_nonzero(known)):
+        return np.zeros(len(bodies), np.bool_)
+    movers = seen.select(known)
+    came_since = movers.tracked_s <= since_s[:, None] + _OVERLAP_S
+    near = movers.covers(bodies.xy_m, bodies.half_view_m + _REACH_M, _REACH_M)
+    return np.asarray(strips & (came_since & near).any(axis=1))

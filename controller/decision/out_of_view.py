@@ -22,6 +22,8 @@ body of the last scene that is missing in this one is kept while its place is no
 * A narrow strip within 0.5 m of a mover that is kept and was seen for longer, with the same velocity within 2
   sigma: dropped, it was the last visible part of that mover (controller/decision/leftover_strips.py). It was
   seen to move for less than 0.5 s, or is judged standing, but was measured as moving, for 0.5 to 1 s.
+* A narrow strip that was seen for 0.5 s at most, near which a mover has come into view since: dropped once
+  that one has been seen for longer, it was the first visible part of him.
 """
 
 from __future__ import annotations
@@ -32,7 +34,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.decision.bodies import Bodies, covering, no_bodies
-from controller.decision.leftover_strips import leftover_strips
+from controller.decision.leftover_strips import first_strips, leftover_strips
 from controller.decision.seen_through import SeenThrough, unproven
 from controller.decision.unseen_motion import (
     MIN_TRACKED_S,
@@ -187,6 +189,7 @@ class OutOfView:
         kept = _still_kept(bodies, since_s, seen, out, pose)
         if not np.count_nonzero(bodies.moving):
             return kept
+        kept &= ~first_strips(bodies, since_s, seen)
         return kept & ~leftover_strips(bodies, kept)
 
     def _outside_view(self, bodies: Bodies, pose: PlanarPose, edges: ViewEdges) -> BoolArray:

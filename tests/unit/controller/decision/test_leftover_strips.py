@@ -1,4 +1,4 @@
-"""The last strips of somebody who leaves the view: they go with him."""
+"""The last strips of somebody who leaves the view go with him; the first ones of who comes in are his."""
 
 from __future__ import annotations
 
@@ -73,3 +73,46 @@ def test_a_limb_of_a_walker_that_was_judged_standing_goes_with_him() -> None:
 )
 def test_no_other_strip_does(bodies: tuple[Bodies, ...]) -> None:
     assert 2 in left_behind(*bodies)
+
+
+def hand(half_across_m: float = 0.07, age_s: float = 0.3, vy_mps: float = -0.1) -> Bodies:
+    """Has swung over the edge of the view, and out of it again."""
+    return strip(1.5, vy_mps, half_across_m, 0.3, age_s)
+
+
+def comer(y_m: float = 0.85, age_s: float = 0.6, vy_mps: float = -0.6, x_m: float = 2.0) -> Bodies:
+    """Somebody in view, seen for age_s."""
+    return box(x_m, y_m, 0.0, vy_mps, number=3, sigma_mps=0.2, age_s=age_s)
+
+
+def expected_after(strip: Bodies, seen: Bodies, gone_s: float = 0.8) -> bool:
+    """Whether the strip is still reckoned with once seen is in view, gone_s after it has left the view."""
+    view = OutOfView(MOUNT, 1.5)
+    before, scenes = strip, round(gone_s * 1e9) // FRAME_NS
+    for scene in range(1, scenes + 1):
+        now_ns = scene * FRAME_NS
+        now = replace(seen, captured_ns=now_ns) if scene == scenes else no_bodies(now_ns)
+        kept = view.update(before, now, HERE, EDGES, False, NOTHING_SEEN)
+        before = now
+    return 2 in kept.ids
+
+
+def test_a_hand_that_came_in_first_belongs_to_who_comes_in_there() -> None:
+    """It would be waited for beside the view for six seconds."""
+    assert not expected_after(hand(), comer())
+
+
+@pytest.mark.parametrize(
+    ("strip", "seen"),
+    [
+        pytest.param(hand(half_across_m=0.15), comer(), id="as wide as somebody"),
+        pytest.param(hand(age_s=0.6), comer(), id="seen for long enough"),
+        pytest.param(hand(), comer(age_s=0.4), id="not known for long enough"),
+        pytest.param(hand(), comer(age_s=2.0), id="was in view before"),
+        pytest.param(hand(), comer(vy_mps=0.0), id="stands"),
+        pytest.param(hand(), comer(y_m=0.3), id="comes in elsewhere, across"),
+        pytest.param(hand(), comer(x_m=3.5), id="comes in elsewhere, along"),
+    ],
+)
+def test_no_other_hand_does(strip: Bodies, seen: Bodies) -> None:
+    assert expected_after(strip, seen)
