@@ -63,6 +63,13 @@ def test_where_a_suspect_ends_is_a_guess() -> None:
     assert tracks.border_is_guess.tolist() == [False, True, False]
 
 
+def test_a_piece_hangs_until_it_is_seen_to_reach_down() -> None:
+    """Of a beam over the way, a piece is no obstacle either. The tracker ends this where cells are low."""
+    tracks = one_mover()
+    cut_out(tracks, SEEN, LABELS, regions.measure(GRID, LABELS, 1), [Cut(LEFT, 0.3), Cut(RIGHT, 0.0)], 1.5)
+    assert tracks.overhead.tolist() == [False, True, True]
+
+
 def test_a_mover_goes_on_from_the_middle_of_what_it_keeps_with_the_same_velocity() -> None:
     tracks = one_mover()
     cuts = [Cut(LEFT, 0.0, left_by=0)]
