@@ -45,13 +45,14 @@ _FARTHEST_RAW = np.iinfo(np.uint16).max - 1  # the largest raw depth that is mea
 class _View:
     """The silhouettes in the image of one camera.
 
-    limit_raw: (H, W) raw depth up to which a pixel is the robot's own; 0 outside of the silhouettes.
+    beyond_raw: (H, W) the least raw depth at which a pixel is not the robot's own; 0 outside of the
+        silhouettes.
     place: rows and columns that hold all silhouettes.
     cells: where own parts may be in the depth grid.
     cores: of each part, flat cells of the grid that should show it, whatever moves a little.
     """
 
-    limit_raw: DepthImage
+    beyond_raw: DepthImage
     place: tuple[slice, slice]
     cells: OwnCells
     cores: tuple[NDArray[np.intp], ...]
@@ -84,7 +85,7 @@ class OwnParts:
         view = self._view_of(frame)
         rows, columns = view.place
         bounds = rows.start, rows.stop, columns.start, columns.stop
-        depth, own = _cut_out(np.ascontiguousarray(frame.depth), view.limit_raw, *bounds)
+        depth, own = _cut_out(np.ascontiguousarray(frame.depth), view.beyond_raw, *bounds)
         inside = cv2.erode(own[view.place], np.ones((_STRAY_PX, _STRAY_PX), np.uint8))
         around = 2 * (_GROWN_PX - 1) + 1
         own[view.place] = cv2.dilate(inside, np.ones((around, around), np.uint8))
@@ -136,7 +137,7 @@ def _view(
     y_px = (step // 2 + step * np.arange(rows)).astype(np.float32)
     hidden_m = hidden_floor_m(may_be, mount, camera, y_px)
     cores = tuple(_core(view, config, (rows, columns)) for view in views)
-    raw = np.minimum(np.floor(limit_m / depth_scale_m), _FARTHEST_RAW).astype(np.uint16)
+    raw = np.minimum(np.ceil(limit_m / depth_scale_m), _FARTHEST_RAW).astype(np.uint16)
     return _View(raw, _place(limit_m > 0.0), OwnCells(may_be, inverse, hidden_m), cores)
 
 
@@ -172,7 +173,7 @@ def _core(view: BoxView, config: PerceptionConfig, shape: tuple[int, int]) -> ND
 
 def _place(silhouettes: NDArray[np.bool_]) -> tuple[slice, slice]:
     """Rows and columns that hold all of silhouettes (H, W), with room to grow; empty without any."""
-    rows, columns = silhouettes.any(axis=1).nonzero()[0], silhouettes.any(axis=0).nonzero()[0]
+    rows, columns = (np.flatnonzero(silhouettes.any(axis=axis)) for axis in (1, 0))
     if not len(rows):
         return slice(0, 0), slice(0, 0)
     height, width = silhouettes.shape
@@ -184,16 +185,17 @@ def _place(silhouettes: NDArray[np.bool_]) -> tuple[slice, slice]:
 
 @compiled("uint16[:, ::1], uint16[:, ::1], int64, int64, int64, int64")
 def _cut_out(
-    depth: DepthImage, limit: DepthImage, top: int, bottom: int, left: int, right: int
+    depth: DepthImage, beyond: DepthImage, top: int, bottom: int, left: int, right: int
 ) -> tuple[DepthImage, Mask]:
-    """depth (H, W) without what is not farther than limit (H, W); and where that is, or nothing is measured.
+    """depth (H, W) without what is nearer than beyond (H, W); and where that is, or nothing is measured.
 
-    top, bottom, left, right: outside of these limit is 0.
+    top, bottom, left, right: outside of these beyond is 0.
     """
     kept, own = depth.copy(), np.zeros(depth.shape, np.uint8)
     for i in range(top, bottom):
+        # Without a branch, so that the processor can do several at once.
         for j in range(left, right):
-            if limit[i, j] > 0 and depth[i, j] <= limit[i, j]:
-                kept[i, j] = 0
-                own[i, j] = 1
+            nearer = depth[i, j] < beyond[i, j]
+            own[i, j] = np.uint8(nearer)
+            kept[i, j] = np.uint16(0) if nearer else depth[i, j]
     return kept, own

@@ -50,7 +50,7 @@ def hidden_floor_m(may_be: BoolGrid, mount: CameraMount, camera: Intrinsics, y_p
     It is where the floor comes into view above the silhouettes. Columns in which that is farther than
     MOST_HIDDEN_M do not count: there the floor is a hole, which no assumption covers.
     """
-    columns = may_be.any(axis=0).nonzero()[0]
+    columns = np.flatnonzero(may_be.any(axis=0))
     above = may_be.argmax(axis=0)[columns] - 1
     above = above[above >= 0]
     if not len(above):
