@@ -26,9 +26,10 @@ from vision.depth.own_cells import OwnCells, hidden_floor_m, with_own
 
 Mask = NDArray[np.uint8]
 
-# Silhouettes are grown by this much: 2 pixels for vibration and rounded measures, and 6 pixels because the
-# depth of a fragment's end is read that far around it (vision/depth/depth_mask.py).
-_GROWN_PX = 8
+# The depth of a fragment's end is read so far around it (vision/depth/depth_mask.py). Silhouettes are grown
+# by this, and by 2 pixels for vibration and rounded measures.
+_END_PX = 6
+_GROWN_PX = _END_PX + 2
 # Room behind the far side of a box: unevenness, and noise.
 _ROOM_M, _SIGMAS = 0.02, 3.0
 # Beside a nearer surface a stereo camera measures nothing in a band as wide as the difference of the two
@@ -36,8 +37,11 @@ _ROOM_M, _SIGMAS = 0.02, 3.0
 _BASELINE_M = 0.05
 # Of the width of the image, at most: a part at the lens would put everything beside it in its shadow.
 _SHADOW_SHARE = 0.1
-# Single pixels without depth inside a silhouette are lost ones, not own ones: 3x3 pixels are.
-_STRAY_PX = 3
+# Where two surfaces meet in the image, the depth of a few pixels is a mixture of both. Inside a silhouette
+# these are taken out with the part: they would stand in the air right before the robot.
+_RIM_PX = 3
+# Single pixels without depth inside a silhouette are lost ones: own ones have own ones this far around them.
+_STRAY_PX = 1
 _FARTHEST_RAW = np.iinfo(np.uint16).max - 1  # the largest raw depth that is measured
 
 
@@ -48,12 +52,14 @@ class _View:
     beyond_raw: (H, W) the least raw depth at which a pixel is not the robot's own; 0 outside of the
         silhouettes.
     place: rows and columns that hold all silhouettes.
+    grown: the silhouettes, grown, within place.
     cells: where own parts may be in the depth grid.
     cores: of each part, flat cells of the grid that should show it, whatever moves a little.
     """
 
     beyond_raw: DepthImage
     place: tuple[slice, slice]
+    grown: NDArray[np.bool_]
     cells: OwnCells
     cores: tuple[NDArray[np.intp], ...]
 
@@ -86,9 +92,12 @@ class OwnParts:
         rows, columns = view.place
         bounds = rows.start, rows.stop, columns.start, columns.stop
         depth, own = _cut_out(np.ascontiguousarray(frame.depth), view.beyond_raw, *bounds)
-        inside = cv2.erode(own[view.place], np.ones((_STRAY_PX, _STRAY_PX), np.uint8))
-        around = 2 * (_GROWN_PX - 1) + 1
-        own[view.place] = cv2.dilate(inside, np.ones((around, around), np.uint8))
+        if not view.grown.size:  # none is in view, after all
+            self.near = own
+            return frame
+        inside = cv2.erode(own[view.place], _square(_STRAY_PX))
+        depth[view.place][(cv2.dilate(inside, _square(_STRAY_PX + _RIM_PX)) > 0) & view.grown] = 0
+        own[view.place] = cv2.dilate(inside, _square(_STRAY_PX + _END_PX))
         self.near = own
         return replace(frame, depth=depth)
 
@@ -138,7 +147,9 @@ def _view(
     hidden_m = hidden_floor_m(may_be, mount, camera, y_px)
     cores = tuple(_core(view, config, (rows, columns)) for view in views)
     raw = np.minimum(np.ceil(limit_m / depth_scale_m), _FARTHEST_RAW).astype(np.uint16)
-    return _View(raw, _place(limit_m > 0.0), OwnCells(may_be, inverse, hidden_m), cores)
+    grown, own_cells = limit_m > 0.0, OwnCells(may_be, inverse, hidden_m)
+    place = _place(grown)
+    return _View(raw, place, grown[place].copy(), own_cells, cores)
 
 
 def _limit_m(views: Sequence[BoxView], noise: DepthNoise) -> NDArray[np.float32]:
@@ -164,11 +175,15 @@ def _shadow(view: BoxView, camera: Intrinsics) -> Mask:
 def _core(view: BoxView, config: PerceptionConfig, shape: tuple[int, int]) -> NDArray[np.intp]:
     """Flat cells well inside of the silhouette of a part that is far enough away to be measured."""
     measurable = (view.seen & (view.enter_m >= config.min_depth_m)).astype(np.uint8)
-    size = 2 * _GROWN_PX + 1
-    inside = np.asarray(cv2.erode(measurable, np.ones((size, size), np.uint8)))
+    inside = np.asarray(cv2.erode(measurable, _square(_GROWN_PX)))
     middle = slice(config.grid_step_px // 2, None, config.grid_step_px)
     cells: BoolGrid = inside[middle, middle][: shape[0], : shape[1]] > 0
     return np.flatnonzero(cells)
+
+
+def _square(reach_px: int) -> Mask:
+    """A kernel that reaches so far to every side."""
+    return np.ones((2 * reach_px + 1, 2 * reach_px + 1), np.uint8)
 
 
 def _place(silhouettes: NDArray[np.bool_]) -> tuple[slice, slice]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
@@ -60,7 +61,8 @@ def test_floor_that_it_hides_is_as_floor_below_the_view() -> None:
     assert space.floor_from_m > HIDDEN_M
     assert space.blind_m == space.floor_from_m
     free = eyes().perceive(frame_of(ROOM), None, None).scene.free_space
-    assert (free.floor_from_m, free.blind_m) == (pytest.approx(1.27, abs=0.02), 0.0)
+    assert free.floor_from_m == pytest.approx(1.27, abs=0.02)
+    assert free.blind_m == 0.0
 
 
 @pytest.mark.parametrize("distance_m", [0.9, 1.5, 4.0])
@@ -139,6 +141,18 @@ def test_beside_it_a_stereo_camera_measures_nothing_and_that_is_no_hole() -> Non
     assert (space.known_m > 6.0).all()
 
 
+def test_depth_mixed_of_the_part_and_its_background_goes_with_the_part() -> None:
+    """In three rows above its upper edge, as real cameras have it: it would stand right before the robot."""
+    frame = frame_of(ROOM + bumper())
+    depth = frame.depth.copy()
+    seen = box_view(BUMPER, MOUNT, VGA).seen
+    top = seen.nonzero()[0].min()
+    for row, mixed in ((top - 3, 1500), (top - 2, 1100), (top - 1, 700)):
+        depth[row] = np.where(seen[top], mixed, depth[row])
+    cut = OwnParts((BUMPER,), MOUNT, CONFIG).without(replace(frame, depth=depth))
+    assert cut.depth[cut.depth > 0].min() > 2000
+
+
 def test_no_fragment_lies_on_it() -> None:
     over = box_view(BUMPER, MOUNT, VGA).seen
     counts = []
@@ -190,13 +204,27 @@ def test_a_body_that_ends_at_an_own_part_is_hidden_there() -> None:
     assert cut.depth[400, 320] == 0
 
 
-def test_depth_behind_the_far_side_stays_to_the_last_unit() -> None:
+def test_depth_behind_the_far_side_stays_but_for_a_rim() -> None:
     frame = frame_of(ROOM + bumper())
     cut = OwnParts((BUMPER,), MOUNT, CONFIG).without(frame)
     far_m = BUMPER.to_m[0] + 0.02 + 3.0 * (0.005 + 0.0075 * BUMPER.to_m[0] ** 2)
-    kept = cut.depth > 0
-    assert (frame.depth[~kept & (frame.depth > 0)] * 0.001 <= far_m + 0.001).all()
+    kept, own = cut.depth > 0, frame.depth * 0.001 <= far_m
     np.testing.assert_array_equal(cut.depth[kept], frame.depth[kept])
+    assert not kept[own].any()
+    rim = cv2.dilate(own.astype(np.uint8), np.ones((7, 7), np.uint8)) > 0
+    assert kept[~rim].all()
+
+
+def test_a_part_that_turns_out_to_be_out_of_view_changes_nothing() -> None:
+    """A camera may tell its own view only once it runs."""
+    behind = OwnPart(name="tail", from_m=(-0.5, -0.3, 0.2), to_m=(-0.4, 0.3, 0.5))
+    frame = frame_of(ROOM)
+    own = OwnParts((behind,), MOUNT, CONFIG)
+    assert own.without(frame) is frame
+    grid = own.mark(make_grid(frame, CONFIG, MOUNT))
+    assert not grid.own.any()
+    assert grid.hidden_m == 0.0
+    assert not own.under(np.zeros((3, 2, 2), np.float32)).any()
 
 
 def test_another_size_of_image_has_its_own_silhouette() -> None:
