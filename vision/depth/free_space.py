@@ -185,8 +185,8 @@ def _first_hole(
     """(B,) row at which the floor ends in each band, counted from the bottom (0); len(limit_m): nowhere.
 
     A row is a hole if less than half of its cells show floor. The floor ends at the first of two successive
-    holes, or at a hole in the last row. It is 0 if some rows are unmeasured or hidden and none before the
-    hole shows floor.
+    holes, or at a hole in the last row. It is 0 if some rows are unmeasured and none before the hole shows
+    floor.
 
     limit_m (k,): maximum depth of floor in the lowest k rows. unmeasured: the number of these that are too
     near to be measured. In them cells without data are no hole; measured cells count as elsewhere.
@@ -197,7 +197,7 @@ def _first_hole(
     depth, is_valid, is_beyond, is_own = depth_m.ravel(), valid.ravel(), beyond.ravel(), own.ravel()
     result = np.empty(bands, np.intp)
     for band in range(bands):
-        seen_to, shown, before, behind_own = 0, False, False, False
+        seen_to, shown, before = 0, False, False
         for row in range(rows):
             floor, nothing, of_robot = 0, 0, 0
             for place in range(band * width, (band + 1) * width):
@@ -207,7 +207,6 @@ def _first_hole(
                     nothing += not (is_valid[cell] or is_beyond[cell])
                     of_robot += has_own and is_own[cell]
             if 2 * floor < width and row < hidden and 2 * of_robot >= width:
-                behind_own = True
                 continue
             hole = 2 * floor < width and not (row < unmeasured and 2 * nothing >= width)
             shown |= 2 * floor >= width
@@ -217,5 +216,5 @@ def _first_hole(
             before = hole
             if not hole:
                 seen_to = row + 1
-        result[band] = seen_to if shown or not (unmeasured or behind_own) else 0
+        result[band] = seen_to if shown or not unmeasured else 0
     return result
