@@ -49,17 +49,15 @@ _FARTHEST_RAW = np.iinfo(np.uint16).max - 1  # the largest raw depth that is mea
 class _View:
     """The silhouettes in the image of one camera.
 
-    beyond_raw: (H, W) the least raw depth at which a pixel is not the robot's own; 0 outside of the
-        silhouettes.
-    place: rows and columns that hold all silhouettes.
-    grown: the silhouettes, grown, within place.
+    beyond_raw: (h, w) the least raw depth at which a pixel is not the robot's own; 0 outside of the
+        silhouettes. It is the part of the image that holds them all; (0, 0): none is in view.
+    corner: row and column of its first pixel in the image.
     cells: where own parts may be in the depth grid.
     cores: of each part, flat cells of the grid that should show it, whatever moves a little.
     """
 
     beyond_raw: DepthImage
-    place: tuple[slice, slice]
-    grown: NDArray[np.bool_]
+    corner: tuple[int, int]
     cells: OwnCells
     cores: tuple[NDArray[np.intp], ...]
 
@@ -67,7 +65,7 @@ class _View:
 class OwnParts:
     """Takes the own parts out of the frames of one camera, one frame after another.
 
-    near: (H, W) not 0 on own pixels of the last frame and close around them.
+    near: (H, W) 255 on own pixels of the last frame and close around them, else 0.
     """
 
     def __init__(self, parts: Sequence[OwnPart], mount: CameraMount, config: PerceptionConfig) -> None:
@@ -89,17 +87,15 @@ class OwnParts:
     def without(self, frame: RgbdFrame) -> RgbdFrame:
         """frame without the depth of own parts."""
         view = self._view_of(frame)
-        rows, columns = view.place
-        bounds = rows.start, rows.stop, columns.start, columns.stop
-        depth, own = _cut_out(np.ascontiguousarray(frame.depth), view.beyond_raw, *bounds)
-        if not view.grown.size:  # none is in view, after all
-            self.near = own
+        if not view.beyond_raw.size:  # none is in view, after all
             return frame
-        inside = cv2.erode(own[view.place], _square(_STRAY_PX))
-        depth[view.place][(cv2.dilate(inside, _square(_STRAY_PX + _RIM_PX)) > 0) & view.grown] = 0
-        own[view.place] = cv2.dilate(inside, _square(_STRAY_PX + _END_PX))
-        self.near = own
-        return replace(frame, depth=depth)
+        depth, (top, left) = np.ascontiguousarray(frame.depth), view.corner
+        inside = cv2.erode(_nearer(depth, view.beyond_raw, top, left), _square(_STRAY_PX))
+        rim = np.asarray(cv2.dilate(inside, _square(_STRAY_PX + _RIM_PX)), np.uint8)
+        height, width = view.beyond_raw.shape
+        near = self.near[top : top + height, left : left + width]
+        cv2.dilate(inside, _square(_STRAY_PX + _END_PX), dst=near)
+        return replace(frame, depth=_cut_out(depth, view.beyond_raw, rim, top, left))
 
     def mark(self, grid: DepthGrid) -> DepthGrid:
         """grid of the last frame, with its own cells."""
@@ -108,16 +104,13 @@ class OwnParts:
 
     def under(self, ends_px: NDArray[np.float32]) -> NDArray[np.bool_]:
         """(N,) fragments with an end on an own part of the last frame, or close to one. ends_px (N, 2, 2)."""
-        height, width = self.near.shape
-        columns = np.rint(ends_px[:, :, 0]).astype(np.intp).clip(0, width - 1)
-        rows = np.rint(ends_px[:, :, 1]).astype(np.intp).clip(0, height - 1)
-        result: NDArray[np.bool_] = self.near[rows, columns].any(axis=1)
-        return result
+        return _under(self.near, np.ascontiguousarray(ends_px))
 
     def _view_of(self, frame: RgbdFrame) -> _View:
         of = frame.intrinsics, frame.depth_scale_m
         if self._view is None or self._of != of:
             self._of, self._view = of, _view(self._parts, self._mount, self._config, *of)
+            self.near = np.zeros((frame.intrinsics.height, frame.intrinsics.width), np.uint8)
         return self._view
 
 
@@ -147,9 +140,9 @@ def _view(
     hidden_m = hidden_floor_m(may_be, mount, camera, y_px)
     cores = tuple(_core(view, config, (rows, columns)) for view in views)
     raw = np.minimum(np.ceil(limit_m / depth_scale_m), _FARTHEST_RAW).astype(np.uint16)
-    grown, own_cells = limit_m > 0.0, OwnCells(may_be, inverse, hidden_m)
-    place = _place(grown)
-    return _View(raw, place, grown[place].copy(), own_cells, cores)
+    place = _place(limit_m > 0.0)
+    corner = place[0].start, place[1].start
+    return _View(np.ascontiguousarray(raw[place]), corner, OwnCells(may_be, inverse, hidden_m), cores)
 
 
 def _limit_m(views: Sequence[BoxView], noise: DepthNoise) -> NDArray[np.float32]:
@@ -198,19 +191,40 @@ def _place(silhouettes: NDArray[np.bool_]) -> tuple[slice, slice]:
     )
 
 
-@compiled("uint16[:, ::1], uint16[:, ::1], int64, int64, int64, int64")
-def _cut_out(
-    depth: DepthImage, beyond: DepthImage, top: int, bottom: int, left: int, right: int
-) -> tuple[DepthImage, Mask]:
-    """depth (H, W) without what is nearer than beyond (H, W); and where that is, or nothing is measured.
-
-    top, bottom, left, right: outside of these beyond is 0.
-    """
-    kept, own = depth.copy(), np.zeros(depth.shape, np.uint8)
-    for i in range(top, bottom):
+@compiled("uint16[:, ::1], uint16[:, ::1], int64, int64")
+def _nearer(depth: DepthImage, beyond: DepthImage, top: int, left: int) -> Mask:
+    """(h, w) 255 where depth (H, W) is less than beyond (h, w), a part of the image from top and left on."""
+    own = np.empty(beyond.shape, np.uint8)
+    for i in range(beyond.shape[0]):
         # Without a branch, so that the processor can do several at once.
-        for j in range(left, right):
-            nearer = depth[i, j] < beyond[i, j]
-            own[i, j] = np.uint8(nearer)
-            kept[i, j] = np.uint16(0) if nearer else depth[i, j]
-    return kept, own
+        for j in range(beyond.shape[1]):
+            own[i, j] = np.uint8(255) * np.uint8(depth[top + i, left + j] < beyond[i, j])
+    return own
+
+
+@compiled("uint16[:, ::1], uint16[:, ::1], uint8[:, ::1], int64, int64")
+def _cut_out(depth: DepthImage, beyond: DepthImage, rim: Mask, top: int, left: int) -> DepthImage:
+    """depth (H, W) without what is less than beyond (h, w), as in _nearer(), nor what is in the rim (h, w).
+
+    Where beyond is 0, outside of the silhouettes, nothing is cut out.
+    """
+    kept = depth.copy()
+    for i in range(beyond.shape[0]):
+        for j in range(beyond.shape[1]):
+            here = depth[top + i, left + j]
+            own = (here < beyond[i, j]) | ((rim[i, j] > 0) & (beyond[i, j] > 0))
+            kept[top + i, left + j] = np.uint16(0) if own else here
+    return kept
+
+
+@compiled("uint8[:, ::1], float32[:, :, ::1]")
+def _under(near: Mask, ends_px: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """As OwnParts.under(). Ends beyond the image count as at its border."""
+    height, width = near.shape
+    result = np.zeros(len(ends_px), np.bool_)
+    for n in range(len(ends_px)):
+        for end in range(2):
+            column = min(max(int(np.rint(ends_px[n, end, 0])), 0), width - 1)
+            row = min(max(int(np.rint(ends_px[n, end, 1])), 0), height - 1)
+            result[n] |= near[row, column] > 0
+    return result

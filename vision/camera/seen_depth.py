@@ -40,7 +40,7 @@ class SeenDepth:
 
     @property
     def near_own(self) -> Mask | None:
-        """(H, W) not 0 on own parts and close around them; None: there are none."""
+        """(H, W) 255 on own parts and close around them, else 0; None: there are none."""
         return None if self._own is None else self._own.near
 
     def take(self, frame: RgbdFrame) -> tuple[RgbdFrame, DepthGrid]:

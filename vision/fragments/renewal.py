@@ -77,7 +77,7 @@ class Renewal:
         a column of such parts; if there are no fragments at all, all parts; if few are missing, none.
 
         without_depth: how many of the present fragments have no depth; only a small share may. turns: for how
-        many frames' worth of parts there is time. near_own (H, W): not 0 where the robot itself is seen, and
+        many frames' worth of parts there is time. near_own (H, W): 255 where the robot itself is seen, and
         nothing is searched; None: nowhere.
         """
         settings = self._config.fragments
@@ -115,7 +115,7 @@ class Renewal:
         )
         edges = self._edges(grey[rows, columns], self._threshold[row, column])
         if near_own is not None:
-            edges[near_own[rows, columns] > 0] = 0
+            edges = np.asarray(cv2.subtract(edges, near_own[rows, columns]), np.uint8)
         full = counts >= 2 * settings.fragments_per_tile
         searched = _outside_of(full, settings.tile_px, edges, rows.start, columns.start)
         return find_segments(searched, settings.min_length_px, (columns.start, rows.start))
