@@ -235,13 +235,13 @@ def test_the_outline_of_an_own_part_is_dashed_around_its_silhouette() -> None:
     without, drawn_on = drawn(moment), drawn(dataclasses.replace(moment, own_parts=(bumper,)))
     changed = (without != drawn_on).any(axis=2)
     seen = box_view(bumper, moment.mount, moment.frame.intrinsics).seen.astype(np.uint8)
-    # A dash may cut a corner by a few pixels.
-    rim = cv2.dilate(seen, np.ones((9, 9), np.uint8)) - cv2.erode(seen, np.ones((9, 9), np.uint8))
-    assert changed.any()
-    assert not changed[rim == 0].any()
-    # About half of it, as it is dashed.
-    contour_px = np.count_nonzero(seen - cv2.erode(seen, np.ones((3, 3), np.uint8)))
-    assert 0.3 * contour_px < np.count_nonzero(changed) < 3.0 * contour_px
+    # It ends at the border of the image, too. A dash may cut a corner by a few pixels.
+    around = cv2.copyMakeBorder(seen, 9, 9, 9, 9, cv2.BORDER_CONSTANT, value=0)
+    rim = cv2.dilate(around, np.ones((9, 9), np.uint8)) - cv2.erode(around, np.ones((9, 9), np.uint8))
+    assert not changed[rim[9:-9, 9:-9] == 0].any()
+    # About half of it, as it is dashed; a line is drawn with soft edges.
+    outline_px = cv2.arcLength(cv2.findContours(seen, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)[0][0], True)
+    assert 0.4 * outline_px < np.count_nonzero(changed) < 2.0 * outline_px
 
 
 def test_without_a_mounting_no_own_part_is_drawn() -> None:
