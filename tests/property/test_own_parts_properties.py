@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from hypothesis import assume, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from config.own_parts import OwnPart, check_own_parts
@@ -35,12 +35,13 @@ def test_nothing_beyond_the_outline_is_cut_out(
     robot: Robot, one: tuple[float, float, float], other: tuple[float, float, float], depth_m: float
 ) -> None:
     low, high = np.minimum(one, other), np.maximum(one, other)
-    assume((high - low > 0.01).all())
+    if (high - low <= 0.01).any():
+        return
     part = OwnPart(name="part", from_m=tuple(low.tolist()), to_m=tuple(high.tolist()))
     try:
         check_own_parts([part], robot)
     except ValueError:
-        assume(False)
+        return  # the camera is inside of it
     raw = np.full((120, 160), round(depth_m * 1000), np.uint16)
     frame = RgbdFrame(COLOUR, raw, 0.001, 0, 0.0, 0, CAMERA)
     mount, config = mount_of(robot), PerceptionConfig()
