@@ -5,6 +5,7 @@ known_keys.py - names the place of a mistake and suggests the key that was meant
 app.py - the whole configuration of `treadwatch run`, `govern` and `replay`, and what must fit together
 robot.py - body, limits and camera mount of the robot
 camera.py - which camera, with its settings
+own_parts.py - parts of the robot that its camera sees
 chassis.py - which chassis, and the link to it
 agilex.py - models of AgileX bases, with their top speeds
 chassis_checks.py - what must fit between chassis, limits and control rate

@@ -7,12 +7,19 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, PrivateAttr, model_validator
 
-from config.camera import AnyCameraConfig, CameraConfig, ReplayCameraConfig, SimulatedCameraConfig
+from config.camera import (
+    AnyCameraConfig,
+    CameraConfig,
+    CameraSection,
+    ReplayCameraConfig,
+    SimulatedCameraConfig,
+)
 from config.chassis import ChassisConfig
 from config.chassis_checks import check_protocol, check_top_speed, check_turns
 from config.decision import DecisionConfig
 from config.governor import GovernorConfig
 from config.loader import Section, load, read_yaml, resolve
+from config.own_parts import OwnPart, check_own_parts
 from config.path import PathSpec
 from config.perception import PerceptionConfig
 from config.plant import PlantConfig
@@ -32,6 +39,10 @@ class SimulationConfig(Section):
     scenario: str = Field(description="a scenario that ships, by name, or a YAML file beside this one")
     seed: int = Field(default=1, ge=0)
     plant: PlantConfig = PlantConfig()
+    own_parts: Annotated[tuple[OwnPart, ...], Field(strict=False)] = Field(
+        default=(),
+        description="parts of the robot that the simulated camera sees; camera.own_parts cuts them out again",
+    )
     base: Literal["emulated", "external"] = Field(
         default="emulated",
         description="external: a base or an emulator of its own stands at the other end of chassis.link, "
@@ -162,6 +173,7 @@ class AppConfig(Section):
     def _fits_together(self) -> Self:
         if self.camera.kind != "simulated":
             self._check_real_robot()  # first: a default that does not fit is not the user's mistake
+        check_own_parts(self.camera.own_parts, self.robot)
         _check_speeds(self.robot, self.perception)
         _check_range(self.perception, self.decision)
         _check_latency(self.runner, self.decision)
@@ -226,6 +238,10 @@ def load_app(path: Path) -> AppConfig:
     return config
 
 
+class ReplayedCameraConfig(CameraSection):
+    """The camera of a recording that is replayed: everything but own_parts is in the recording."""
+
+
 class ReplayConfig(Section):
     """What `treadwatch replay --config FILE` reads: how a recording is looked at.
 
@@ -234,12 +250,14 @@ class ReplayConfig(Section):
     """
 
     robot: Robot = Robot()
+    camera: ReplayedCameraConfig = ReplayedCameraConfig()
     perception: PerceptionConfig = PerceptionConfig()
     decision: DecisionConfig = DecisionConfig()
     assume_mount: bool = Field(default=False, description="use robot.camera_mount where none is recorded")
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
+        check_own_parts(self.camera.own_parts, self.robot)
         _check_speeds(self.robot, self.perception)
         _check_range(self.perception, self.decision)
         return self
@@ -254,6 +272,10 @@ def load_replay(path: Path) -> ReplayConfig:
     if isinstance(content, dict) and "chassis" in content:
         robot = load_app(path)
         return ReplayConfig(
-            robot=robot.robot, perception=robot.perception, decision=robot.decision, assume_mount=True
+            robot=robot.robot,
+            camera=ReplayedCameraConfig(own_parts=robot.camera.own_parts),
+            perception=robot.perception,
+            decision=robot.decision,
+            assume_mount=True,
         )
     return load(path, ReplayConfig)

@@ -8,6 +8,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from config.loader import Section
+from config.own_parts import OwnPart
 
 # A D435i's colour camera, 1920x1080: focal length in image heights, and the aspect ratio of the whole sensor.
 # No video mode is wider than the sensor.
@@ -18,7 +19,26 @@ _D435I_ASPECT = 16.0 / 9.0
 OdometryChoice = Literal["auto", "file", "none", "groundtruth"]
 
 
-class ReplayCameraConfig(Section):
+# Width and height of the image, fx, fy, cx, cy, all in pixels.
+NominalView = tuple[int, int, float, float, float, float]
+
+
+class CameraSection(Section):
+    """What every camera can be told, whatever its kind.
+
+    own_parts: parts of the robot in the camera's view, which are cut out of its images (config/own_parts.py),
+    such as ``own_parts: [{name: bumper, from_m: [0.40, -0.35, 0.0], to_m: [0.55, 0.35, 0.25]}]``.
+    """
+
+    own_parts: Annotated[tuple[OwnPart, ...], Field(strict=False)] = ()
+
+    @property
+    def nominal_view(self) -> NominalView | None:
+        """What is known of the image before the camera is open; None: nothing."""
+        return None
+
+
+class ReplayCameraConfig(CameraSection):
     """A recording, played in its own time: a TUM folder (rgb.txt, depth.txt, camera.yaml) or a ROS bag."""
 
     kind: Literal["replay"] = "replay"
@@ -64,7 +84,7 @@ class ReplayCameraConfig(Section):
         return None
 
 
-class RealsenseCameraConfig(Section):
+class RealsenseCameraConfig(CameraSection):
     """An Intel RealSense D435i, depth aligned to colour.
 
     depth_options, colour_options: options of the depth and of the colour sensor by librealsense's names, set
@@ -99,8 +119,14 @@ class RealsenseCameraConfig(Section):
         half = 0.5 * min(self.width / self.height, _D435I_ASPECT) / _D435I_FOCAL
         return half, half
 
+    @property
+    def nominal_view(self) -> NominalView:
+        """See CameraSection; as for edge_tangents."""
+        focal_px = self.width / sum(self.edge_tangents)
+        return self.width, self.height, focal_px, focal_px, 0.5 * (self.width - 1), 0.5 * (self.height - 1)
 
-class SimulatedCameraConfig(Section):
+
+class SimulatedCameraConfig(CameraSection):
     """A D435i-like camera in the simulated world: depth aligned to colour, both at one time.
 
     depth_noise: standard deviation z^2 * 0.0075 / m (realsense: what a real one was measured to do),
@@ -139,6 +165,11 @@ class SimulatedCameraConfig(Section):
     def edge_tangents(self) -> tuple[float, float]:
         """Tangents of the angles from the axis to the left and the right edge of the image, both positive."""
         return (self.cx + 0.5) / self.fx, (self.width - 0.5 - self.cx) / self.fx
+
+    @property
+    def nominal_view(self) -> NominalView:
+        """See CameraSection."""
+        return self.width, self.height, self.fx, self.fy, self.cx, self.cy
 
     @model_validator(mode="after")
     def _possible(self) -> Self:

@@ -6,6 +6,7 @@ The files and folders in the order in which they come into play:
 * mission/ - `treadwatch run`; governor/ - `treadwatch govern`; watch/ - `treadwatch watch`; replay/ -
   `treadwatch replay`
 * build.py, build_chassis.py - make the parts that the YAML asks for; path/ - the planned path
+* own_parts.py - refuses parts of the robot that its camera does not see, or that hide too much
 * lockstep.py, realtime/ - the loops: when a frame is looked at, and when the control steps
 * perceive.py - a frame through vision/
 * control.py - one control step, through all files from here to follow.py, to the base and back

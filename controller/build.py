@@ -30,6 +30,7 @@ from controller.base.response_monitor import ResponseMonitor
 from controller.control import ControlLoop, Decides
 from controller.decision.decide import DecisionMaker
 from controller.follow import PathFollower
+from controller.own_parts import require_own_parts_in_view
 from controller.path.path import Path, PathError
 from controller.perceive import Perceiver
 from controller.record.recorder import VideoSettings
@@ -48,7 +49,7 @@ from hal.clocks import NS_PER_S
 from hal.errors import BadRecording
 from hal.geometry import mount_of
 from hal.links.datagrams import UdpSocket, UnixSocket
-from hal.types import PlanarPose
+from hal.types import Intrinsics, PlanarPose
 from sim.rendering.camera import SimulatedCamera
 from sim.rendering.faulty_camera import FaultyCamera
 from sim.rendering.late_camera import LateCamera
@@ -106,7 +107,11 @@ def build_perceiver(
     """Perception: detect and track, timed by stopwatch_ns."""
     limit_vision_threads()
     perception = Perception(
-        config.perception, mount_of(config.robot), config.robot.body.height_m, config.robot.body.clearance_m
+        config.perception,
+        mount_of(config.robot),
+        config.robot.body.height_m,
+        config.robot.body.clearance_m,
+        config.camera.own_parts,
     )
     return Perceiver(perception, odometry, body_pose, stopwatch_ns)
 
@@ -152,12 +157,17 @@ def open_camera(config: AppConfig, clock: Clock, body_pose: BodyPose, start_ns: 
 
 
 def require_camera(config: AppConfig) -> None:
-    """Check that a recording can be opened before a robot is armed; another process will read it.
+    """Check, before a robot is armed, that a recording can be opened, which another process will read, and
+    that the own parts are where the camera sees them.
 
-    Raises HalError.
+    Raises HalError, ConfigError.
     """
+    view = config.camera.nominal_view
+    camera = None if view is None else Intrinsics(*view)
     if isinstance(config.camera, ReplayCameraConfig):
-        _recording(config, config.camera)
+        camera = _recording(config, config.camera).intrinsics
+    if camera is not None:
+        require_own_parts_in_view(config.file, config.camera.own_parts, mount_of(config.robot), camera)
 
 
 def _recording(config: AppConfig, camera: ReplayCameraConfig) -> Recording:
@@ -182,6 +192,7 @@ def open_simulated_camera(
         clock,
         lambda stamp_ns: body_pose(stamp_ns) or start,
         start_ns,
+        () if config.simulation is None else config.simulation.own_parts,
     )
 
 
@@ -221,6 +232,7 @@ def video_settings(config: AppConfig) -> VideoSettings:
         _fps(config),
         config.robot.limits.max_speed_mps,
         config.perception.max_depth_m,
+        config.camera.own_parts,
     )
 
 

@@ -6,6 +6,7 @@ errors.py - the tree of errors that they raise
 records.py - dataclasses that are quick to make
 clocks.py - the monotonic clock, and a simulated one
 geometry.py - transforms between floor, body and camera
+box_view.py - where the camera sees a box that is fixed to the robot
 directions.py - parts of vectors along a direction, for compiled loops
 compiled.py - compilation of loops with Numba
 step_records.py - records as arguments of compiled loops

@@ -31,6 +31,8 @@ Terms:
   (vision/motion/residuals.py).
 * evidence of a track: support for its motion, by the residuals of its fragments, by arrivals and by its
   surface. MotionEvidence is that of one frame; judgement adds it up over frames to a score.
+* own part: a part of the robot in its camera's view, cut out of the depth (vision/camera/own_parts.py); own
+  cell: a cell that shows one.
 * region: measures of a labelled set of cells (a part or a surface): box, centre, extent, whether it is cut.
 * line of sight: from the camera to a body. Motion along it is measured by depth and by changes of length,
   motion across it by the image.

@@ -7,20 +7,21 @@ and the camera's health is checked. track (vision/tracker.py) takes the Detectio
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from config.own_parts import OwnPart
 from config.perception import PerceptionConfig
 from hal.types import CameraMount, FloatArray, Pose, RgbdFrame
-from vision.camera.floor import FloorFinder, on_floor
 from vision.camera.gyro import GyroMemory
 from vision.camera.health import Continuity, FrameCheck, HealthMonitor, with_ego_motion
 from vision.camera.lens import vector_from_rotation
-from vision.camera.mount_check import MountCheck
-from vision.depth.depth_grid import DepthGrid, make_grid
+from vision.camera.seen_depth import SeenDepth
+from vision.depth.depth_grid import DepthGrid
 from vision.depth.depth_mask import surface_depth
 from vision.detection import NOT_COMPARED, CameraMotion, Detection, camera_motion_of, unknown_residuals
 from vision.ego_motion.camera_motion import CameraEstimate, estimate
@@ -29,6 +30,7 @@ from vision.ego_motion.motion_prior import MotionPrior
 from vision.ego_motion.rolling_shutter import ReadOut
 from vision.fragments import optical_flow
 from vision.fragments.attention import Attention, NeedsFragments
+from vision.fragments.candidates import NewFragments
 from vision.fragments.edges import GreyImage
 from vision.fragments.optical_flow import Pyramid, pyramid
 from vision.fragments.renewal import Renewal
@@ -64,17 +66,17 @@ class _Now:
 class Detector:
     """Keeps the fragments, the last image and the camera's pose in a fixed frame of its own."""
 
-    def __init__(self, config: PerceptionConfig, mount: CameraMount | None) -> None:
+    def __init__(
+        self, config: PerceptionConfig, mount: CameraMount | None, own_parts: Sequence[OwnPart] = ()
+    ) -> None:
         self._config = config
-        self._mount = mount
+        self._depth = SeenDepth(config, mount, own_parts)
         self._store = FragmentStore()
         self._renewal = Renewal(config)
         self._attention = Attention(config)
         self._renewed = True  # the fragments, in the last frame
         self._health = HealthMonitor(config)
         self._last_health = CameraHealth(CameraCondition.GOOD, "", float("nan"))
-        self._floor = FloorFinder()
-        self._mount_check = MountCheck()
         self._images: Pyramid = ()
         self._last_ns = 0
         self._pose = _IDENTITY
@@ -93,7 +95,7 @@ class Detector:
             self._gyro.add(frame.gyro)
         odometry = odometry if odometry is None or odometry.finite else None
         grey = np.asarray(cv2.cvtColor(frame.colour, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
-        grid = self._grid(frame)
+        frame, grid = self._depth.take(frame)
         check = self._health.check(frame, grey, grid, odometry)
         now = _Now(frame, grey, grid, odometry, self._judge(check, grid, frame.captured_ns))
         if not check.usable or check.continuity in (Continuity.REPEATED, Continuity.BACKWARD):
@@ -108,8 +110,8 @@ class Detector:
     def _judge(self, check: FrameCheck, grid: DepthGrid, captured_ns: int) -> CameraHealth:
         """The camera's health by the images and the mounting, before anything is tracked."""
         health = check.health
-        if self._mount is not None and check.usable:
-            health = self._mount_check.judge(grid, captured_ns, health)
+        if check.usable:
+            health = self._depth.judge(grid, captured_ns, health)
         if check.continuity is Continuity.REPEATED and health.condition is CameraCondition.GOOD:
             # A repeated image cannot have a better health than it was reported with before.
             health = replace(self._last_health, valid_depth_ratio=health.valid_depth_ratio)
@@ -166,7 +168,7 @@ class Detector:
             config.fragments,
         )
         found = flow.found.reshape(-1, 2)
-        both = found[:, 0] & found[:, 1]
+        both = found[:, 0] & found[:, 1] & ~self._depth.on_own(flow.pixels.reshape(-1, 2, 2))
         store.ends_px = flow.pixels.reshape(-1, 2, 2)
         store.error_px = flow.error_px.reshape(-1, 2)
         store.keep(both)
@@ -202,14 +204,6 @@ class Detector:
         average_depth(store, store.last_entries(frame.captured_ns), found.pose, noise)
         return motion
 
-    def _grid(self, frame: RgbdFrame) -> DepthGrid:
-        grid = make_grid(frame, self._config, self._mount)
-        if self._mount is None:
-            floor = self._floor.find(grid)
-            if floor is not None:
-                return on_floor(grid, floor, self._config.depth_noise)
-        return grid
-
     def _renew_fragments(
         self, now: _Now, previous: Percept | None, excluded: NDArray[np.bool_], dt_s: float
     ) -> None:
@@ -225,8 +219,8 @@ class Detector:
 
     def _renew(self, now: _Now, turns: int = 1) -> None:
         without_depth = int(np.count_nonzero(np.isnan(self._store.near_m).all(axis=1)))
-        new = self._renewal.find(now.frame, now.grey, self._store.ends_px, without_depth, turns)
-        self._store.add(new.ends_px, new.near_m, new.far_m, new.pixel_cov)
+        ends_px, near_own = self._store.ends_px, self._depth.near_own
+        self._add(self._renewal.find(now.frame, now.grey, ends_px, without_depth, turns, near_own))
 
     def _look_closer(self, now: _Now, bodies: NeedsFragments, turns: int) -> bool:
         """Look at one body a turn, while it is the turn of any. Whether at least one was looked at."""
@@ -234,8 +228,13 @@ class Detector:
             new = self._attention.find(now.frame, now.grey, self._store.ends_px, bodies)
             if new is None:
                 return turn > 0
-            self._store.add(new.ends_px, new.near_m, new.far_m, new.pixel_cov, body_only=True)
+            self._add(new, body_only=True)
         return True
+
+    def _add(self, new: NewFragments, body_only: bool = False) -> None:
+        """Keep new fragments, unless they are on the robot itself."""
+        new = new.select(~self._depth.on_own(new.ends_px))
+        self._store.add(new.ends_px, new.near_m, new.far_m, new.pixel_cov, body_only=body_only)
 
     def _commit(self, now: _Now, images: Pyramid, sweep_rad: FloatArray) -> None:
         """The next frame is compared with this one."""
@@ -287,5 +286,5 @@ class Detector:
             motion_known=camera.known,
             reckoned=camera.reckoned,
             blurred=camera.blurred,
-            floor=self._mount_check.floor,
+            floor=self._depth.floor,
         )

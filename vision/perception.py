@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+from config.own_parts import OwnPart
 from config.perception import PerceptionConfig
 from hal.types import CameraMount, PlanarPose, Pose, RgbdFrame
 from vision.detection import Detection
@@ -19,8 +22,10 @@ class Perception:
         mount: CameraMount | None,
         body_height_m: float,
         clearance_m: float,
+        own_parts: Sequence[OwnPart] = (),
     ) -> None:
-        self._detector = Detector(config, mount)
+        """own_parts: parts of the robot in the camera's view. They need a mounting."""
+        self._detector = Detector(config, mount, own_parts)
         self._tracker = Tracker(config, body_height_m, clearance_m)
         self._before: Percept | None = None
 

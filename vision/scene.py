@@ -63,10 +63,10 @@ class FreeSpace:
     nearest_m: (N,) forward distance z to the nearest obstacle surface; inf: none seen.
     known_m: (N,) forward distance up to which the space was really seen. Space beyond is unknown and
         therefore not free.
-    blind_m: floor in view nearer than this forward distance is too near to be measured, and is not part of
-        what is known; 0.0: all of it can be measured.
-    floor_from_m: nearer than this forward distance the floor is below the view, however far known_m reaches;
-        0.0: not known; NEVER_M: the floor never comes into view.
+    blind_m: floor in view nearer than this forward distance is too near to be measured, or hidden by a part
+        of the robot, and is not part of what is known; 0.0: all of it can be measured.
+    floor_from_m: nearer than this forward distance the floor is below the view, or hidden by a part of the
+        robot, however far known_m reaches; 0.0: not known; NEVER_M: the floor never comes into view.
     up_tan: rise of the upper edge of the view above the camera's height per metre of forward distance; inf:
         not known.
     blank: (N,) bands in which hardly anything was measured at all, near or far; None: not reported.

@@ -55,7 +55,10 @@ _COARSE_S = 0.5  # step of the times beyond those of the worst case
 _OWNED_WITHIN_M = 0.8
 # A surface this far behind the robot's front is in a place where only the robot itself can be.
 _INSIDE_M = 0.05
-_INSIDE = "a surface is inside the robot's outline: stop; is a part of the robot in view?"
+_INSIDE = (
+    "a surface is inside the robot's outline: stop; is a part of the robot in view? Then give it in "
+    "camera.own_parts"
+)
 
 
 class SpeedLimits:

@@ -14,6 +14,7 @@ from controller.build import (
     build_perceiver,
     build_simulation,
     open_faulty_camera,
+    require_camera,
     video_settings,
 )
 from controller.build_chassis import build_base
@@ -88,6 +89,7 @@ def drive_lockstep(
     config: AppConfig, runner: LockstepRunner, options: MissionOptions, console: Console
 ) -> MissionResult:
     """Drive in one thread, in simulated time."""
+    require_camera(config)
     clock = SimulatedClock()
     path = build_path(config)
     chassis, emulator = build_base(config, path.start, clock.now_ns())

@@ -11,6 +11,7 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
+from config.own_parts import OwnPart
 from config.robot import Body
 from controller.control import ControlStep
 from controller.decision.decision import Decision
@@ -58,7 +59,8 @@ class RecordingOptions:
 
 @dataclass(frozen=True, slots=True)
 class VideoSettings:
-    """What the video shows besides the observations; None: not known. fps: pictures a second."""
+    """What the video shows besides the observations; None: not known. fps: pictures a second. own_parts:
+    parts of the robot that its camera sees."""
 
     mount: CameraMount | None
     body: Body | None
@@ -66,6 +68,7 @@ class VideoSettings:
     fps: float
     top_speed_mps: float
     range_m: float
+    own_parts: tuple[OwnPart, ...] = ()
 
 
 class Recorder:
@@ -125,6 +128,7 @@ class Recorder:
                 path_ahead_m,
                 settings.corridor_half_width_m,
                 ending,
+                settings.own_parts,
             )
             with self._isolation.guard(video):
                 video.write(self._composer.compose(moment), look.frame.captured_ns)

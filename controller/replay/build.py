@@ -29,7 +29,9 @@ def build_replay_perceiver(
     """Perception for a recording; the robot is at the origin in every frame."""
     limit_vision_threads()
     body = config.robot.body
-    perception = Perception(config.perception, mount, body.height_m, body.clearance_m)
+    perception = Perception(
+        config.perception, mount, body.height_m, body.clearance_m, config.camera.own_parts
+    )
     return Perceiver(perception, odometry, lambda _stamp_ns: _ORIGIN, stopwatch_ns)
 
 
@@ -62,4 +64,5 @@ def replay_video_settings(
         round(_replay_fps(fps), 2),
         config.robot.limits.max_speed_mps,
         config.perception.max_depth_m,
+        config.camera.own_parts,
     )

@@ -15,12 +15,14 @@ import numpy as np
 
 from config.app import ReplayConfig, load_replay
 from config.camera import OdometryChoice
+from config.loader import ConfigError
 from controller.base.ego_speed import EgoSpeed
 from controller.build import open_replay, straight_ahead
 from controller.decision.decide import DecisionMaker
 from controller.decision.decision import Decision
 from controller.decision.situation import Situation
 from controller.errors import UserError
+from controller.own_parts import require_own_parts_in_view
 from controller.path.path import OnPath, Path
 from controller.perceive import Look
 from controller.record.observations import STANDARD_OUTPUT
@@ -34,7 +36,7 @@ from hal.cameras.pose_track import PoseTrack
 from hal.clocks import NS_PER_S
 from hal.errors import EndOfStream
 from hal.geometry import mount_of
-from hal.types import CameraMount, PlanarPose
+from hal.types import CameraMount, Intrinsics, PlanarPose
 
 # The robot is at the origin in every frame: there is one decision a frame, at the time of that frame.
 _STANDING = PlanarPose(0.0, 0.0, 0.0)
@@ -89,6 +91,7 @@ def run_replay(options: ReplayOptions) -> None:
     console = Console(options.quiet, aside=options.observations == STANDARD_OUTPUT)
     source, odometry = open_replay(options.recording, options.odometry, options.topics, options.use_gyro)
     mount = recorded_mount(config, source.mount)
+    _require_own_parts(options, config, mount, source.intrinsics)
     perceiver = build_replay_perceiver(config, mount, odometry, time.perf_counter_ns)
     decide = build_replay_decision(config, mount, source.fps)
     path = straight_ahead(config.robot)
@@ -152,6 +155,21 @@ def recorded_mount(config: ReplayConfig, recorded: CameraMount | None) -> Camera
     if recorded is not None or not config.assume_mount:
         return recorded
     return mount_of(config.robot)
+
+
+def _require_own_parts(
+    options: ReplayOptions, config: ReplayConfig, mount: CameraMount | None, camera: Intrinsics
+) -> None:
+    """Raise ConfigError if the own parts cannot be cut out of the images of this recording."""
+    parts = config.camera.own_parts
+    if not parts:
+        return
+    if mount is None:
+        raise ConfigError(
+            f"{options.config_path}: camera.own_parts needs the camera's mounting, to know where it sees "
+            "them; set assume_mount: true, or give the recording's camera_height_m"
+        )
+    require_own_parts_in_view(options.config_path, parts, mount, camera)
 
 
 def _decide(decide: DecisionMaker, path: Path, look: Look, v_mps: float) -> Decision:

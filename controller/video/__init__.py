@@ -3,6 +3,7 @@
 moment.py - the data of one picture
 seen_obstacles.py - obstacles in the body frame, as all views name them
 corridor.py - the planned path as it is drawn
+own_parts.py - the outlines of what the camera sees of the robot itself
 compose.py - one picture from one moment
 style.py, draw.py, text.py, labels.py, placement.py - palette, strokes, text, labels and layout
 header.py, colour_view.py, depth_view.py, top_view.py, speed_strip.py, legend.py - the panels

@@ -10,6 +10,7 @@ from controller.video import draw, text
 from controller.video.corridor import DrawnCorridor
 from controller.video.labels import draw_labels
 from controller.video.moment import VideoMoment
+from controller.video.own_parts import draw_own_parts
 from controller.video.placement import Placement, placement
 from controller.video.seen_obstacles import SeenObstacle
 from controller.video.style import (
@@ -55,6 +56,8 @@ class ColourView:
         origin = np.array([placed.place.x, placed.place.y])
         if corridor is not None and moment.mount is not None:
             _draw_corridor(inside, corridor, moment.mount, moment.frame.intrinsics, placed, origin)
+        if moment.mount is not None:
+            draw_own_parts(inside, moment.own_parts, moment.mount, moment.frame.intrinsics, placed)
         _draw_fragments(inside, moment.fragments, placed, origin)
         boxes_px = [(obstacle, obstacle.box_px(moment.frame.intrinsics)) for obstacle in seen]
         boxes = [

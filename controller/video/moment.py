@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from config.own_parts import OwnPart
 from config.robot import Body
 from controller.decision.decision import Decision
 from hal.types import CameraMount, FloatArray, RgbdFrame
@@ -22,6 +23,7 @@ class VideoMoment:
     path_ahead_m: (N, 2) points of the planned path in the body frame, nearest first.
     corridor_half_width_m: how far to either side of the path the robot sweeps.
     ending: how the drive ended, for the frames that came after the last decision; empty: it goes on.
+    own_parts: parts of the robot that its camera sees; they need a mount.
     """
 
     frame: RgbdFrame
@@ -35,3 +37,4 @@ class VideoMoment:
     path_ahead_m: FloatArray | None = None
     corridor_half_width_m: float | None = None
     ending: str = ""
+    own_parts: tuple[OwnPart, ...] = ()

@@ -7,6 +7,7 @@ render.py - one noiseless picture: colour, inverse depth and labels
 spans.py, raster.py - which face is seen at each pixel
 shade.py - the colour of each pixel
 shadow.py - soft shadows on the floor
+own_parts.py - parts of the robot that its camera sees
 antialias.py - smooth edges
 depth_noise.py, colour_noise.py - what the sensors add
 truth.py - ground truth of a picture, for evaluation

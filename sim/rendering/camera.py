@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from types import TracebackType
 from typing import Self
 
 from config.camera import SimulatedCameraConfig
+from config.own_parts import OwnPart
 from hal.api import Clock
 from hal.clocks import NS_PER_S
 from hal.errors import DeviceRefused, FrameTimeout
@@ -16,6 +17,7 @@ from hal.geometry import camera_in_floor
 from hal.types import CameraMount, ColourImage, Intrinsics, PlanarPose, Pose, RgbdFrame
 from sim.rendering.colour_noise import ColourSensor
 from sim.rendering.depth_noise import DEPTH_SCALE_M, DepthSensor
+from sim.rendering.own_parts import OwnPartsPainter
 from sim.rendering.render import Picture, Renderer
 from sim.world import World
 
@@ -33,8 +35,10 @@ class SimulatedCamera:
         clock: Clock,
         body_pose: BodyPoseAt,
         start_ns: int | None = None,
+        own_parts: Sequence[OwnPart] = (),
     ) -> None:
-        """body_pose: the true pose of the robot on the floor at a time of the clock."""
+        """body_pose: the true pose of the robot on the floor at a time of the clock. own_parts: of the robot,
+        which the camera sees."""
         self._config = config
         self._mount = mount
         self._clock = clock
@@ -45,6 +49,7 @@ class SimulatedCamera:
         self._renderer = Renderer(world, self._intrinsics)
         self._depth = DepthSensor(config, self._intrinsics, world.seed)
         self._sensor = ColourSensor(self._intrinsics, world.seed)
+        self._own = OwnPartsPainter(own_parts, mount, self._intrinsics) if own_parts else None
         self._picture: Picture | None = None
         self._is_closed = False
 
@@ -113,6 +118,8 @@ class SimulatedCamera:
     def _expose(self, stamp_ns: int) -> RgbdFrame:
         t_s = (stamp_ns - self._start_ns) / NS_PER_S
         self._picture = self._renderer.render(t_s, self.camera_pose(stamp_ns))
+        if self._own is not None:
+            self._own.draw(self._picture)
         return RgbdFrame(
             colour=self._colour(self._picture.colour),
             depth=self._depth.measure(self._picture.inverse_depth, self._index),

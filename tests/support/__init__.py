@@ -23,6 +23,7 @@ Depth and images:
 * walker.py - a plate that walks past, and what is found moving
 * painted.py - RGB-D frames painted from textured rectangles
 * painted_room.py - a painted room, and a crate to put into it
+* own_bumper.py - a painted robot that sees its own bumper
 
 Recordings and cameras:
 

@@ -138,8 +138,10 @@ def _colour_problems(same_frames: int, dark: float, bright: float) -> Iterator[_
 def _depth_findings(grid: DepthGrid, frozen_frames: int) -> tuple[bool, float, list[_Problem]]:
     """Whether depth is usable, which share of it holds data, and what is wrong with it."""
     # Depth beyond the mask counts as measured, but shows nothing that could be touched.
-    near_share = float(np.count_nonzero(grid.valid)) / grid.valid.size
-    share = near_share + float(np.count_nonzero(grid.beyond)) / grid.beyond.size
+    # What own parts hide is none of the camera's faults.
+    size = max(grid.valid.size - int(np.count_nonzero(grid.own)), 1)
+    near_share = float(np.count_nonzero(grid.valid)) / size
+    share = near_share + float(np.count_nonzero(grid.beyond)) / size
     usable, problems = near_share >= _MIN_DEPTH_SHARE, list[_Problem]()
     if not usable:
         within = f"data nearer than {grid.range_m:.3g} m"

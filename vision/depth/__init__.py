@@ -4,6 +4,7 @@ Files, in the order in which they come into play:
 
 * depth_noise - standard deviation of measured depth.
 * depth_grid - the coarse grid of depth, with heights over the floor.
+* own_cells - cells that show the robot itself, not its surroundings.
 * cells - in which cell of the grid a pixel or a ray falls.
 * depth_mask - near and far surface around pixels; the depth of fragments.
 * connected - cells that stand out of the floor, and their connected parts.

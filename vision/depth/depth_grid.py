@@ -7,7 +7,7 @@ of pixels, smoothed by a median over 5x5 cells.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Annotated, TypeVar
 
@@ -37,6 +37,7 @@ CELL_HEIGHT_NOISE = 0.4
 _INVALID_RAW = np.uint16(65535)  # raw depth of an invalid cell: it sorts behind all valid ones
 _MIN_SIDE_PX = 32  # as config/recording.py and config/camera.py require
 _FOUR_FROM_PX = 4  # from this cell size on a cell takes four samples, below it the middle pixel
+NO_OWN_CELLS: BoolGrid = np.zeros((0, 0), np.bool_)
 _AGREE_INVERSE = 0.03  # 1/m: samples of a cell that differ by more lie on two surfaces
 
 
@@ -47,7 +48,7 @@ class DepthGrid:
     step_px, offset_px: cell (i, j) stands for the pixels around row offset + step * i, column offset + step *
         j.
     depth_m: 0 where not valid, (h, w).
-    inverse_depth: 0 where not valid, (h, w).
+    inverse_depth: 0 where not valid, but own parts have theirs, (h, w).
     valid: measured within the range, (h, w).
     beyond: measured, but farther than range_m, so that space is seen free up to there, (h, w).
     x, y: ray at z = 1 m of each column, (w,), and row, (h,).
@@ -57,6 +58,8 @@ class DepthGrid:
     pitch_rad: of the mounting; NaN where that is not known.
     up: the floor's normal in optical axes, (3,); None where the floor is not known.
     range_m: of the depth mask, or as far as 16 bits reach in the camera's unit.
+    own: the cell shows the robot itself, (h, w); (0, 0) where no part of it is in view (own_cells.py).
+    hidden_m: forward distance up to which own parts may hide the floor; 0.0: none.
     """
 
     step_px: int
@@ -74,6 +77,8 @@ class DepthGrid:
     pitch_rad: float
     up: FloatArray | None
     range_m: float
+    own: CellFlags = field(default_factory=lambda: NO_OWN_CELLS)
+    hidden_m: float = 0.0
 
     def points(self, cells: NDArray[np.intp]) -> FloatGrid:
         """(3, K) points in the camera axes of flat cell indices (K,)."""

@@ -33,7 +33,7 @@ def free_space(
     obstacle (h, w): cells between clearance and the robot's height; all valid cells where the floor is not
     known. measurable_from_m: floor nearer than this depth cannot be measured (vision/depth/near_floor.py), so
     that missing data there is no hole; 0.0: all floor can be measured. Without a known mounting, space is
-    known up to the nearest surface only.
+    known up to the nearest surface only. Floor that own parts hide (own_cells.py) is as floor below the view.
     """
     bands, blind_m = level_bands(grid), 0.0
     nearest = _nearest_m(grid.forward_m, obstacle, bands.band, len(bands))
@@ -49,8 +49,8 @@ def free_space(
         half_width_tan=bands.half_width_tan,
         nearest_m=nearest,
         known_m=known,
-        blind_m=blind_m,
-        floor_from_m=_floor_from_m(grid),
+        blind_m=max(blind_m, grid.hidden_m),
+        floor_from_m=max(_floor_from_m(grid), grid.hidden_m),
         up_tan=_up_tan(grid),
         blank=_blank(grid, bands, known, nearest),
     )
@@ -150,23 +150,37 @@ def _known_m(
     if floor is None:
         return np.zeros(len(bands)), 0.0
     unmeasured = int(np.count_nonzero(floor.depth_m < measurable_from_m))
+    hidden = int(np.count_nonzero(floor.forward_m < grid.hidden_m))
     first = _first_hole(
-        grid.valid, grid.beyond, grid.depth_m, bands.cells, bands.width, floor.limit_m, unmeasured
+        grid.valid,
+        grid.beyond,
+        grid.depth_m,
+        grid.own,
+        bands.cells,
+        bands.width,
+        floor.limit_m,
+        unmeasured,
+        hidden,
     )
     # With a hole in the lowest row nothing is known, since nothing nearer is in view.
     known: FloatArray = np.where(first == 0, 0.0, floor.reach_m[first])
     return known, float(floor.forward_m[unmeasured - 1]) if unmeasured else 0.0
 
 
-@compiled("boolean[:, ::1], boolean[:, ::1], float32[:, ::1], int32[:, ::1], int64, float32[::1], int64")
+@compiled(
+    "boolean[:, ::1], boolean[:, ::1], float32[:, ::1], boolean[:, ::1], int32[:, ::1], int64, float32[::1]",
+    "int64, int64",
+)
 def _first_hole(
     valid: BoolGrid,
     beyond: BoolGrid,
     depth_m: FloatGrid,
+    own: BoolGrid,
     cells: NDArray[np.int32],
     width: int,
     limit_m: NDArray[np.float32],
     unmeasured: int,
+    hidden: int,
 ) -> NDArray[np.intp]:
     """(B,) row at which the floor ends in each band, counted from the bottom (0); len(limit_m): nowhere.
 
@@ -176,25 +190,31 @@ def _first_hole(
 
     limit_m (k,): maximum depth of floor in the lowest k rows. unmeasured: the number of these that are too
     near to be measured. In them cells without data are no hole; measured cells count as elsewhere.
+    own (h, w), or (0, 0): cells that show the robot itself. In the lowest rows, as many as hidden, a row of
+    these is no hole either, if floor is seen beyond it; else the floor ends before it.
     """
-    bands, rows = cells.shape[1] // width, len(limit_m)
-    depth, is_valid, is_beyond = depth_m.ravel(), valid.ravel(), beyond.ravel()
+    bands, rows, has_own = cells.shape[1] // width, len(limit_m), len(own) > 0
+    depth, is_valid, is_beyond, is_own = depth_m.ravel(), valid.ravel(), beyond.ravel(), own.ravel()
     result = np.empty(bands, np.intp)
     for band in range(bands):
-        first, shown, before = rows, False, False
+        seen_to, shown, before = 0, False, False
         for row in range(rows):
-            floor, nothing = 0, 0
+            floor, nothing, of_robot = 0, 0, 0
             for place in range(band * width, (band + 1) * width):
                 cell = cells[len(cells) - 1 - row, place]
                 if cell >= 0:
                     floor += is_valid[cell] and depth[cell] <= limit_m[row]
                     nothing += not (is_valid[cell] or is_beyond[cell])
+                    of_robot += has_own and is_own[cell]
+            if 2 * floor < width and row < hidden and 2 * of_robot >= width:
+                continue
             hole = 2 * floor < width and not (row < unmeasured and 2 * nothing >= width)
             shown |= 2 * floor >= width
             # A single row without floor may be noise.
-            if hole and (before or row == rows - 1):
-                first = row - 1 if before else row
+            if hole and before:
                 break
             before = hole
-        result[band] = first if shown or not unmeasured else 0
+            if not hole:
+                seen_to = row + 1
+        result[band] = seen_to if shown or not unmeasured else 0
     return result

@@ -43,6 +43,14 @@ class NewFragments:
     far_m: NDArray[np.float32]
     pixel_cov: NDArray[np.float32]
 
+    def select(self, wanted: NDArray[np.bool_]) -> NewFragments:
+        """The fragments that are wanted (N,)."""
+        if wanted.all():
+            return self
+        return NewFragments(
+            self.ends_px[wanted], self.near_m[wanted], self.far_m[wanted], self.pixel_cov[wanted]
+        )
+
 
 NOTHING_NEW = NewFragments(
     np.empty((0, 2, 2), np.float32),

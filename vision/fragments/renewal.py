@@ -69,6 +69,7 @@ class Renewal:
         ends_px: NDArray[np.float32],
         without_depth: int,
         turns: int = 1,
+        near_own: GreyImage | None = None,
     ) -> NewFragments:
         """New fragments for the tiles that hold too few ends of the present ones, ends_px (N, 2, 2).
 
@@ -76,7 +77,8 @@ class Renewal:
         a column of such parts; if there are no fragments at all, all parts; if few are missing, none.
 
         without_depth: how many of the present fragments have no depth; only a small share may. turns: for how
-        many frames' worth of parts there is time.
+        many frames' worth of parts there is time. near_own (H, W): 255 where the robot itself is seen, and
+        nothing is searched; None: nowhere.
         """
         settings = self._config.fragments
         rows, columns = (max(1, round(size / part)) for size, part in zip(grey.shape, PART_PX, strict=True))
@@ -93,14 +95,16 @@ class Renewal:
         parts = rows if room * _MANY_MISSING > settings.max_fragments else 1
         chosen = np.argsort(self._last_visit, kind="stable")[: parts * turns if len(ends_px) else None]
         self._last_visit[chosen] = self._visits
-        found = [self._segments(grey, counts, part % rows, part // rows) for part in chosen.tolist()]
+        found = [
+            self._segments(grey, near_own, counts, part % rows, part // rows) for part in chosen.tolist()
+        ]
         far_room = max(0, int(_SHARE_WITHOUT_DEPTH * settings.max_fragments) - without_depth)
         return self._select(frame, grey, np.concatenate(found), ends_px, counts, (room, far_room))
 
     def _segments(
-        self, grey: GreyImage, counts: NDArray[np.int64], row: int, column: int
+        self, grey: GreyImage, near_own: GreyImage | None, counts: NDArray[np.int64], row: int, column: int
     ) -> NDArray[np.float32]:
-        """Segments in one part of the image, outside of full tiles."""
+        """Segments in one part of the image, outside of full tiles and of near_own."""
         settings = self._config.fragments
         rows, columns = (
             slice(
@@ -110,6 +114,8 @@ class Renewal:
             for size, index, count in zip(grey.shape, (row, column), self._threshold.shape[:2], strict=True)
         )
         edges = self._edges(grey[rows, columns], self._threshold[row, column])
+        if near_own is not None:
+            edges = np.asarray(cv2.subtract(edges, near_own[rows, columns]), np.uint8)
         full = counts >= 2 * settings.fragments_per_tile
         searched = _outside_of(full, settings.tile_px, edges, rows.start, columns.start)
         return find_segments(searched, settings.min_length_px, (columns.start, rows.start))

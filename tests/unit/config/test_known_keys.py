@@ -39,7 +39,7 @@ def refusal(tmp_path: Path, *keys: str, base: str = "sim.yaml") -> str:
         (("chassis", "link", "chanel"), "chassis.link.chanel: unknown key; did you mean channel?"),
         (
             ("simulation", "xyz"),
-            "simulation.xyz: unknown key; known here: base, plant, scenario, seed",
+            "simulation.xyz: unknown key; known here: base, own_parts, plant, scenario, seed",
         ),
     ],
 )
@@ -58,7 +58,8 @@ def test_known_keys_are_listed_once(tmp_path: Path) -> None:
     with pytest.raises(ConfigError) as caught:
         load_replay(path)
     assert str(caught.value) == (
-        f"{path}: abc: unknown key; known here: assume_mount, decision, perception, robot; xyz: unknown key"
+        f"{path}: abc: unknown key; known here: assume_mount, camera, decision, perception, robot; "
+        "xyz: unknown key"
     )
 
 

@@ -147,7 +147,7 @@ def test_at_a_lower_frame_rate_as_much_is_searched_in_the_same_time(
     find = Renewal.find
 
     def noted(self: Renewal, frame: RgbdFrame, *rest: Any) -> NewFragments:
-        renewed.append(rest[-1])
+        renewed.append(rest[3])
         return find(self, frame, *rest)
 
     def look(_self: Attention, frame: RgbdFrame, *_: object) -> NewFragments:

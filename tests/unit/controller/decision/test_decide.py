@@ -75,7 +75,11 @@ def test_a_plain_wall_stops_by_depth_alone() -> None:
 @pytest.mark.parametrize(
     ("nearest_m", "told"),
     [
-        (0.56, "a surface is inside the robot's outline: stop; is a part of the robot in view?"),
+        (
+            0.56,
+            "a surface is inside the robot's outline: stop; is a part of the robot in view? Then give it in "
+            "camera.own_parts",
+        ),
         (0.64, "a surface stands on the path 0.0 m ahead: stop"),
     ],
 )

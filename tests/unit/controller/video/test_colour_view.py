@@ -1,9 +1,11 @@
 import dataclasses
 import math
 
+import cv2
 import numpy as np
 import pytest
 
+from config.own_parts import OwnPart
 from controller.video.colour_view import ColourView
 from controller.video.corridor import corridor_ahead
 from controller.video.moment import VideoMoment
@@ -22,6 +24,7 @@ from controller.video.style import (
     Image,
     Rect,
 )
+from hal.box_view import box_view
 from hal.types import Intrinsics
 from tests.support import video_moments as build
 from vision.scene import CameraCondition
@@ -217,3 +220,31 @@ def test_the_cameras_image_is_left_as_it_is() -> None:
     before = moment.frame.colour.copy()
     drawn(moment)
     assert (moment.frame.colour == before).all()
+
+
+def test_the_outline_of_an_own_part_is_dashed_around_its_silhouette() -> None:
+    """A bumper across the view, whose far upper edge is seen."""
+    moment = build.moment()
+    assert moment.mount is not None
+    forward_m, height_m = moment.mount.forward_m, moment.mount.height_m
+    bumper = OwnPart(
+        name="bumper",
+        from_m=(forward_m + 0.4, -0.1, height_m - 0.3),
+        to_m=(forward_m + 0.5, 0.1, height_m - 0.1),
+    )
+    without, drawn_on = drawn(moment), drawn(dataclasses.replace(moment, own_parts=(bumper,)))
+    changed = (without != drawn_on).any(axis=2)
+    seen = box_view(bumper, moment.mount, moment.frame.intrinsics).seen.astype(np.uint8)
+    # It ends at the border of the image, too. A dash may cut a corner by a few pixels.
+    around = cv2.copyMakeBorder(seen, 9, 9, 9, 9, cv2.BORDER_CONSTANT, value=0)
+    rim = cv2.dilate(around, np.ones((9, 9), np.uint8)) - cv2.erode(around, np.ones((9, 9), np.uint8))
+    assert not changed[rim[9:-9, 9:-9] == 0].any()
+    # About half of it, as it is dashed; a line is drawn with soft edges.
+    outline_px = cv2.arcLength(cv2.findContours(seen, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)[0][0], True)
+    assert 0.4 * outline_px < np.count_nonzero(changed) < 2.0 * outline_px
+
+
+def test_without_a_mounting_no_own_part_is_drawn() -> None:
+    part = OwnPart(name="bumper", from_m=(0.4, -0.1, 0.2), to_m=(0.5, 0.1, 0.4))
+    moment = dataclasses.replace(build.moment(), mount=None)
+    assert (drawn(moment) == drawn(dataclasses.replace(moment, own_parts=(part,)))).all()

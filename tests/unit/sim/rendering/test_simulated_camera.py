@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from config.camera import SimulatedCameraConfig
+from config.own_parts import OwnPart
 from config.scenario import load_scenario
+from hal.box_view import box_view
 from hal.clocks import MonotonicClock, SimulatedClock
 from hal.errors import FrameTimeout
 from hal.geometry import camera_in_floor
@@ -143,3 +145,35 @@ def test_vibration_pitches_to_and_fro() -> None:
 def test_simulated_camera_is_a_context_manager() -> None:
     with camera() as source:
         assert source.read(timeout_s=0.0).sequence == 0
+
+
+BUMPER = OwnPart(name="bumper", from_m=(0.70, -0.20, 0.35), to_m=(0.85, 0.20, 0.50))
+MAST = OwnPart(name="mast", from_m=(0.60, -0.02, 0.0), to_m=(0.64, 0.02, 1.0))
+
+
+def test_parts_of_the_robot_are_drawn_where_they_are_seen_and_nowhere_else() -> None:
+    sees = SimulatedCamera(WORLD, CLEAN, MOUNT, SimulatedClock(0), drive, own_parts=[BUMPER, MAST])
+    plain, own = camera(CLEAN).read(0.1), sees.read(0.1)
+    views = [box_view(part, MOUNT, sees.intrinsics) for part in (BUMPER, MAST)]
+    seen = views[0].seen | views[1].seen
+    assert 0.05 < seen.mean() < 0.5
+    np.testing.assert_array_equal(own.depth[~seen], plain.depth[~seen])
+    np.testing.assert_array_equal(own.colour[~seen], plain.colour[~seen])
+    nearest_m = np.min([np.where(view.seen, view.enter_m, np.inf) for view in views], axis=0)
+    # Nearer than depth_min_m a camera measures nothing.
+    measured = seen & (nearest_m > CLEAN.depth_min_m + 0.01)
+    assert np.count_nonzero(measured) > 50
+    np.testing.assert_allclose(own.depth[measured] * own.depth_scale_m, nearest_m[measured], atol=0.01)
+    assert not own.depth[seen & (nearest_m < CLEAN.depth_min_m - 0.01)].any()
+    picture = sees.last_picture
+    assert picture is not None
+    assert not picture.instance_mask()[seen].any()
+
+
+def test_they_move_with_the_camera_and_have_marks() -> None:
+    sees = SimulatedCamera(WORLD, CLEAN, MOUNT, SimulatedClock(0), drive, own_parts=[BUMPER])
+    seen = box_view(BUMPER, MOUNT, sees.intrinsics).seen
+    first, *_, last = (sees.read(0.1) for _ in range(6))
+    np.testing.assert_array_equal(last.colour[seen], first.colour[seen])
+    assert (last.colour[~seen] != first.colour[~seen]).mean() > 0.1
+    assert first.colour[seen].std() > 40.0

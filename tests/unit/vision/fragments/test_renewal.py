@@ -98,6 +98,15 @@ def test_while_few_are_missing_it_does_not_look(missing: int, searched: bool) ->
         np.testing.assert_array_equal(after.ends_px, first.find(frame, grey, present(140), 0).ends_px)
 
 
+def test_nothing_is_searched_on_the_robot_itself() -> None:
+    frame, grey = picture()
+    near_own = np.zeros(grey.shape, np.uint8)
+    near_own[:, 200:] = 255
+    new = Renewal(PerceptionConfig()).find(frame, grey, present(0), 0, near_own=near_own)
+    assert len(new.ends_px) > 5
+    assert new.ends_px[..., 0].max() < 200 + 10  # an end is moved to a corner close by
+
+
 def segments(*middles: tuple[float, float]) -> NDArray[np.float32]:
     """Level ones of 20 px around middles (u, v)."""
     ends = np.repeat(np.array(middles, np.float32).reshape(-1, 1, 2), 2, axis=1)
