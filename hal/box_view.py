@@ -1,7 +1,7 @@
 """Where a camera on the robot sees a box that is fixed to the robot, pixel by pixel.
 
 For parts of the robot in its own view (`camera.own_parts`): vision/camera/own_parts.py cuts them out,
-sim/rendering/own_parts.py draws them, controller/build.py refuses those that hide too much, and
+sim/rendering/own_parts.py draws them, controller/own_parts.py refuses those that hide too much, and
 controller/video/own_parts.py shows their outline.
 """
 
