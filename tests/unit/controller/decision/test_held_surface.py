@@ -113,6 +113,15 @@ def test_one_beside_the_swept_width_that_was_seen_without_a_mover_is_held(frames
     assert drive.on(math.inf, 5) == pytest.approx(2.4)
 
 
+def test_one_beside_the_swept_width_that_no_mover_was_beside_is_held() -> None:
+    """A wall, or a crate that sinks below the view."""
+    drive = Drive()
+    for _ in range(28):
+        drive.s_m += 0.04
+        drive._note(2.4, standing=False, in_swept_width=False)
+    assert drive.on(math.inf, 5) == pytest.approx(2.4)
+
+
 def test_one_that_was_there_before_a_mover_passed_it_is_held_at_rest() -> None:
     drive = Drive()
     drive.on(2.4, 20)
