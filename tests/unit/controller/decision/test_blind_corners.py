@@ -106,8 +106,8 @@ def test_corner_by_noise_is_forgotten() -> None:
 
 class Rack(Aisle):
     """A rack without an end on the left, its goods 0.45 m beside the swept width, and boxes in front of them
-    from x = 4 to 6 m, 0.3 m beside it. With opening_m, so much of the rack behind the boxes is a way, which a
-    wall ends after 1 m. On the right another rack goes on all the way."""
+    from x = 4 to 6 m, 0.3 m beside it. With opening_m, so much of the rack behind the boxes is a way. On the
+    right another rack goes on all the way."""
 
     def __init__(self, opening_m: float) -> None:
         super().__init__(6.0, 0.3, 1)
@@ -120,9 +120,6 @@ class Rack(Aisle):
         on_boxes = (boxes + before > 4.0) & (boxes + before < self.end_m)
         # Who looks into the way sees the side of the goods behind it.
         goods = np.where(goods + before < self.end_m, goods, np.maximum(goods, self.goes_on_m - before))
-        wall = (self.goods_m + 1.0) / right
-        in_way = (wall + before > self.end_m) & (wall + before < self.goes_on_m)
-        goods = np.where(in_way, np.minimum(goods, wall), goods)
         forward = np.where(on_boxes, boxes, goods)
         opposite = self.goods_m / np.where(BEARING > 0.0, BEARING, np.nan)
         forward = np.nan_to_num(np.where(BEARING > 0.0, opposite, forward), nan=9.0)
