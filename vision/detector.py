@@ -172,14 +172,7 @@ class Detector:
         store.ends_px = flow.pixels.reshape(-1, 2, 2)
         store.error_px = flow.error_px.reshape(-1, 2)
         store.keep(both)
-        surface = surface_depth(
-            frame.depth,
-            frame.depth_scale_m,
-            store.ends_px.reshape(-1, 2),
-            config.min_depth_m,
-            config.max_depth_m,
-            config.depth_noise,
-        )
+        surface = surface_depth(frame.depth, frame.depth_scale_m, store.ends_px.reshape(-1, 2), config)
         store.near_m = surface.near_m.reshape(-1, 2).astype(np.float32)
         store.far_m = surface.far_m.reshape(-1, 2).astype(np.float32)
         return moving[both] | store.body_only

@@ -98,7 +98,7 @@ def _adopted(
         own_m = float(np.fmin(near_m[k, 0], near_m[k, 1]))
         u, v = float(ends_px[k, 0, 0]), float(ends_px[k, 0, 1])
         across, down = float(ends_px[k, 1, 0]) - u, float(ends_px[k, 1, 1]) - v
-        sigma_m = depth_sigma_of(own_m, noise.floor_m, noise.quadratic_per_m)
+        sigma_m = depth_sigma_of(own_m, noise)
         track, least, on_it = -1, np.inf, False
         for i in range(len(_ALONG)):
             row = nearest_cell(v + down * _ALONG[i] - _ABOVE_PX[i], offset_px, step_px, height)

@@ -112,9 +112,7 @@ def _since(
 @inlined
 def _cell_sigma_m(depth_m: float, noise: DepthNoise) -> float:
     """Standard deviation of the difference of one cell between two frames."""
-    return (
-        math.sqrt(2.0) * CELL_NOISE_OVER_TIME * depth_sigma_of(depth_m, noise.floor_m, noise.quadratic_per_m)
-    )
+    return math.sqrt(2.0) * CELL_NOISE_OVER_TIME * depth_sigma_of(depth_m, noise)
 
 
 @inlined
@@ -176,7 +174,7 @@ def _compared(
         if found[t] == 0 or found[t] < _MIN_SHARE * cells[t]:
             continue
         there_m = depth_m[t] / found[t]
-        noise_m = depth_sigma_of(there_m, noise.floor_m, noise.quadratic_per_m)
+        noise_m = depth_sigma_of(there_m, noise)
         if there_m + _RANGE_SIGMAS * noise_m > grid.range_m:
             continue
         median_m = _MEDIAN * _cell_sigma_m(there_m, noise) * math.sqrt(_CELLS_ALIKE / found[t])

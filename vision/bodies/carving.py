@@ -107,7 +107,7 @@ def _may_hide_mover(
     searched, overgrown = np.zeros(len(mover), np.bool_), np.zeros(len(mover), np.bool_)
     for t in range(len(mover)):
         width_m, depth_m = measured.extent_m[t, 0], measured.position_m[t, 2]
-        sigma_m = depth_sigma_of(depth_m, noise.floor_m, noise.quadratic_per_m)
+        sigma_m = depth_sigma_of(depth_m, noise)
         compact = width_m <= _COMPACT_M and measured.extent_m[t, 2] <= _COMPACT_M + 2.0 * sigma_m
         calm = tracks.surely_static[t] and tracks.no_evidence_s[t] >= ARRIVED_UP_TO_S
         # If the fragments of something wider than a body stand still while part of it arrives, somebody

@@ -53,7 +53,7 @@ def _needing_fragments(
         if not x * x + y * y + z * z <= _REACH_M**2:
             continue
         depth = max(x * camera.rotation[0, 2] + y * camera.rotation[1, 2] + z * camera.rotation[2, 2], 0.0)
-        gate = _GATE_M + _GATE_SIGMAS * depth_sigma_of(depth, noise.floor_m, noise.quadratic_per_m)
+        gate = _GATE_M + _GATE_SIGMAS * depth_sigma_of(depth, noise)
         gate += 0.5 * np.minimum(tracks.extent_m[n, 2], _DEEPEST_M)
         chosen[count], depth_m[count], gate_m[count] = n, depth, gate
         urgent[count] = tracks.evidence[n] > 0.0 or tracks.sightings[n] < _URGENT_SIGHTINGS

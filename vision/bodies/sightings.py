@@ -127,7 +127,7 @@ def _kinds(
         centre_m[t], squared = outer_point(pose, measured.position_m[t]), 0.0
         for i in range(3):
             squared += (centre_m[t, i] - tracks.state[t, i]) ** 2
-        expected_m = _JUMP_M + 2.0 * depth_sigma_of(depth_m, noise.floor_m, noise.quadratic_per_m)
+        expected_m = _JUMP_M + 2.0 * depth_sigma_of(depth_m, noise)
         # Without a known motion of the camera, its error would be taken for a motion of the tracks.
         steady = motion_known and math.sqrt(squared) <= expected_m
         if sides_visible[t] and change[t] <= _SAME_AREA and steady:
@@ -157,7 +157,7 @@ def _centre_covariances(
         size_m, depth_m = max(width_m, height_m), measured.position_m[t, 2]
         across_m = _CENTRE_SIGMA_M + _CENTRE_SHARE * size_m
         along_m = _CENTRE_SIGMA_M + _CENTRE_DEPTH_SHARE * deep_m
-        noise_m = _CENTRE_NOISE * depth_sigma_of(depth_m, noise.floor_m, noise.quadratic_per_m)
+        noise_m = _CENTRE_NOISE * depth_sigma_of(depth_m, noise)
         variance[0] = across_m**2
         variance[1] = across_m**2 if measured.top_and_bottom_visible[t] else _CUT_SIGMA_M**2
         variance[2] = along_m**2 + noise_m**2
@@ -203,7 +203,7 @@ def _expected(tracks: Tracks, pose: Pose, noise: DepthNoise) -> tuple[FloatArray
     for t in range(count):
         centre_m[t] = inner_point(pose, tracks.state[t, :3])
         depth_m = max(centre_m[t, 2], 0.0)
-        sigma_m[t] = depth_sigma_of(depth_m, noise.floor_m, noise.quadratic_per_m)
+        sigma_m[t] = depth_sigma_of(depth_m, noise)
     return centre_m, sigma_m
 
 

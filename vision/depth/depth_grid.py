@@ -19,7 +19,6 @@ from config.perception import DepthNoise, PerceptionConfig
 from hal.compiled import compiled, inlined
 from hal.types import CameraMount, DepthImage, FloatArray, Intrinsics, RgbdFrame
 from vision.depth.depth_mask import measurable_m
-from vision.depth.depth_noise import depth_sigma_of
 
 Reals = TypeVar("Reals", float, NDArray[np.float32], NDArray[np.float64])
 FloatGrid = NDArray[np.float32]
@@ -288,5 +287,6 @@ def _over_floor(
             depth = depth_m[i, j]
             forward_m[i, j] = depth * ahead[i]
             height_m[i, j] = camera_height_m - depth * drop[i]
-            height_sigma_m[i, j] = share * depth_sigma_of(depth, floor_m, quadratic_per_m)
+            # As depth_sigma_of in depth_noise.py, in single precision.
+            height_sigma_m[i, j] = share * (floor_m + quadratic_per_m * depth * depth)
     return forward_m, height_m, height_sigma_m

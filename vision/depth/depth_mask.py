@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from config.perception import DepthNoise
+from config.perception import DepthNoise, PerceptionConfig
 from hal.compiled import compiled, inlined
 from hal.types import DepthImage, FloatArray
 from vision.camera.lens import RealArray
@@ -48,26 +48,20 @@ def measurable_m(max_m: float, scale_m: float) -> float:
 
 
 def surface_depth(
-    depth: DepthImage,
-    scale_m: float,
-    pixels: RealArray,
-    min_m: float,
-    max_m: float,
-    noise: DepthNoise,
+    depth: DepthImage, scale_m: float, pixels: RealArray, config: PerceptionConfig
 ) -> SurfaceDepth:
-    """Near and far surface around pixels (N, 2), the near one within [min_m, max_m] (the paper's 10 m).
+    """Near and far surface around pixels (N, 2) of depth (H, W), in units of scale_m.
 
-    The far one may be beyond max_m: the texture of a distant wall disturbs an outline as much as that of a
-    near one.
+    The near one is within [min_depth_m, max_depth_m] (the paper's 10 m). The far one may be beyond: the
+    texture of a distant wall disturbs an outline as much as that of a near one.
     """
     near_m, far_m, holes = _surfaces(
         np.ascontiguousarray(depth),
         np.ascontiguousarray(pixels, np.float64),
         np.float32(scale_m),
-        np.float32(min_m),
-        np.float32(measurable_m(max_m, scale_m)),
-        noise.floor_m,
-        noise.quadratic_per_m,
+        np.float32(config.min_depth_m),
+        np.float32(measurable_m(config.max_depth_m, scale_m)),
+        config.depth_noise,
     )
     return SurfaceDepth(near_m, far_m, holes)
 
@@ -109,15 +103,14 @@ def _note_nearest(sample_m: NDArray[np.float32], count: int, nearest_m: NDArray[
             farther_m = farther_m if held_m < farther_m else held_m
 
 
-@compiled("uint16[:, ::1], float64[:, ::1], float32, float32, float32, float64, float64")
+@compiled("uint16[:, ::1], float64[:, ::1], float32, float32, float32", DepthNoise)
 def _surfaces(
     depth: DepthImage,
     pixels: FloatArray,
     scale_m: np.float32,
     min_m: np.float32,
     max_m: np.float32,
-    floor_m: float,
-    quadratic_per_m: float,
+    noise: DepthNoise,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """near_m, far_m and holes of SurfaceDepth. max_m: of the near surface."""
     count = len(pixels)
@@ -134,7 +127,7 @@ def _surfaces(
         _note_nearest(sample_m, measured, nearest_m)
         # With many holes the rank is lowered to a third of the valid samples.
         anchor_m = nearest_m[min(_NEAR_RANK, within // 3)]
-        gate_m = np.float32(0.06 + 3.0 * depth_sigma_of(anchor_m, floor_m, quadratic_per_m))
+        gate_m = np.float32(0.06 + 3.0 * depth_sigma_of(anchor_m, noise))
         near_sum, near_count, far_sum, far_count = 0.0, 0, 0.0, 0
         for j in range(measured):
             behind_m = sample_m[j] - anchor_m

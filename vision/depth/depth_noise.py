@@ -11,13 +11,12 @@ from config.perception import DepthNoise
 from hal.compiled import inlined
 
 Depths = TypeVar("Depths", NDArray[np.float32], NDArray[np.float64])
-Real = TypeVar("Real", float, np.float32)
 
 
 @inlined
-def depth_sigma_of(depth_m: Real, floor_m: Real, quadratic_per_m: Real) -> Real:
+def depth_sigma_of(depth_m: float, noise: DepthNoise) -> float:
     """One standard deviation of a depth, in metres (Khoshelham's model, sigma_z ~ z^2, with a floor)."""
-    return floor_m + quadratic_per_m * depth_m * depth_m
+    return noise.floor_m + noise.quadratic_per_m * depth_m * depth_m
 
 
 def depth_sigma_m(depth_m: Depths, noise: DepthNoise) -> Depths:

@@ -146,7 +146,7 @@ class Attention:
         self, frame: RgbdFrame, grey: GreyImage, ends_px: NDArray[np.float32], body: _Body, wanted: int
     ) -> NewFragments:
         """At most wanted fragments, of pairs of corners on a body."""
-        config, scale_m = self._config, frame.depth_scale_m
+        scale_m = frame.depth_scale_m
         (left, top), (rows, columns) = body.corner_px, body.grey.shape
         points = corners_within(
             body.grey,
@@ -155,9 +155,7 @@ class Attention:
             (body.depth_m + body.gate_m) / scale_m,
         )
         points = points + np.array((left, top), np.float32)
-        surface = surface_depth(
-            frame.depth, scale_m, points, config.min_depth_m, config.max_depth_m, config.depth_noise
-        )
+        surface = surface_depth(frame.depth, scale_m, points, self._config)
         usable = _alone_on_it(surface.near_m, surface.far_m, surface.holes, body)
         # Moved, they would end up on the outline: its corners are the stronger ones, and were left out.
         return self._on_it(frame, grey, in_pairs(points[usable]), 0, ends_px, body, wanted)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from config.perception import FragmentSettings, PerceptionConfig
+from config.perception import DepthNoise, FragmentSettings, PerceptionConfig
 from hal.compiled import compiled, inlined
 from hal.types import FloatArray, RgbdFrame
 from vision.depth.depth_mask import SurfaceDepth, surface_depth
@@ -93,14 +93,8 @@ def trackable_segments(
 
 def depth_along(segments_px: NDArray[np.float32], frame: RgbdFrame, config: PerceptionConfig) -> SurfaceDepth:
     """Near and far surface at 5 points along each of segments (N, 2, 2), from end to end: (N, 5) each."""
-    found = surface_depth(
-        frame.depth,
-        frame.depth_scale_m,
-        _points_along(np.ascontiguousarray(segments_px)),
-        config.min_depth_m,
-        config.max_depth_m,
-        config.depth_noise,
-    )
+    points_px = _points_along(np.ascontiguousarray(segments_px))
+    found = surface_depth(frame.depth, frame.depth_scale_m, points_px, config)
     return SurfaceDepth(*(part.reshape(-1, _PLACES) for part in (found.near_m, found.far_m, found.holes)))
 
 
@@ -109,8 +103,7 @@ def on_one_surface(near_m: FloatArray, config: PerceptionConfig) -> NDArray[np.b
 
     Inverse depth is linear along a segment on one plane; across a depth edge it jumps.
     """
-    noise = config.depth_noise
-    return _on_one_surface(np.ascontiguousarray(near_m), noise.floor_m, noise.quadratic_per_m)
+    return _on_one_surface(np.ascontiguousarray(near_m), config.depth_noise)
 
 
 def new_fragments(
@@ -187,8 +180,8 @@ def _points_along(segments_px: NDArray[np.float32]) -> NDArray[np.float32]:
     return result
 
 
-@compiled("float64[:, ::1], float64, float64")
-def _on_one_surface(near_m: FloatArray, floor_m: float, quadratic_per_m: float) -> NDArray[np.bool_]:
+@compiled("float64[:, ::1]", DepthNoise)
+def _on_one_surface(near_m: FloatArray, noise: DepthNoise) -> NDArray[np.bool_]:
     """As on_one_surface."""
     result = np.empty(len(near_m), np.bool_)
     for n in range(len(near_m)):
@@ -196,7 +189,7 @@ def _on_one_surface(near_m: FloatArray, floor_m: float, quadratic_per_m: float) 
         missing, jumps = 0, np.isnan(begin) or np.isnan(end)
         for place in range(1, _PLACES - 1):
             expected_m = 1.0 / (begin + (end - begin) * (place / (_PLACES - 1)))
-            gate_m = _SAME_M + _SAME_SIGMAS * depth_sigma_of(expected_m, floor_m, quadratic_per_m)
+            gate_m = _SAME_M + _SAME_SIGMAS * depth_sigma_of(expected_m, noise)
             if np.isnan(near_m[n, place]):
                 missing += 1
             elif not abs(near_m[n, place] - expected_m) <= gate_m:

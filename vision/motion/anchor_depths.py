@@ -115,7 +115,7 @@ def _with_sigma(
     for k in range(count):
         if known[k]:
             near[k], far[k] = anchor.depth_m[k], anchor.far_m[k]
-            single = depth_sigma_of(near[k], noise.floor_m, noise.quadratic_per_m)
+            single = depth_sigma_of(near[k], noise)
             # The noise of a mean over these frames, part of which they have in common.
             sigma[k] = single * max(1.0 / math.sqrt(max(anchor.depth_samples[k], 1.0)), _COMMON_NOISE)
             mixed[k] = far[k] - near[k] > _MIXED_M + _MIXED_SIGMAS * single
@@ -157,7 +157,7 @@ def _averaged(
             predicted_m += pose.rotation[i, 2] * (there_m - pose.translation_m[i])
         fragment, end = k // 2, k % 2
         off_m = near_m[fragment, end] - predicted_m
-        sigma_m = depth_sigma_of(predicted_m, noise.floor_m, noise.quadratic_per_m)
+        sigma_m = depth_sigma_of(predicted_m, noise)
         # False where either depth is missing (NaN).
         if abs(off_m) <= _SAME_M + _SAME_SIGMAS * sigma_m:
             new_samples[fragment, end] = min(depth_samples[fragment, end] + 1.0, _MAX_SAMPLES)
@@ -181,7 +181,7 @@ def _steps(
         now_m = np.float64(near_m[fragment, k % 2])
         step_m[k] = now_m - static_m[k, 2]
         known_m = 1.0 if math.isnan(now_m) else now_m
-        sigma_now_m = depth_sigma_of(known_m, noise.floor_m, noise.quadratic_per_m)
+        sigma_now_m = depth_sigma_of(known_m, noise)
         step_sigma_m[k] = math.sqrt(sigma_m * sigma_m + sigma_now_m * sigma_now_m)
         # The averaged depth of the anchor was measured before the anchor's time, on average.
         late_frames = 0.5 * (samples - 1.0) if samples < _MAX_SAMPLES else _SETTLED_LATE_FRAMES

@@ -241,7 +241,7 @@ def _residuals(
         near_chi2 = _squared_sigmas(near_residual, (xx, xy, yy), near_effect)
         # On the far surface the same pixels span more metres.
         wider = (far[2] / max(near[2], MIN_AHEAD_M)) ** 2
-        far_sigma_m = depth_sigma_of(depths.far_m[k], noise.floor_m, noise.quadratic_per_m)
+        far_sigma_m = depth_sigma_of(depths.far_m[k], noise)
         far_effect = by_x * far_sigma_m, by_y * far_sigma_m
         far_chi2 = _squared_sigmas(_residual_m(seen, far), (xx * wider, xy * wider, yy * wider), far_effect)
         static_m[k, 0], static_m[k, 1], static_m[k, 2] = near

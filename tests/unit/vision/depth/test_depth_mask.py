@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from config.perception import DepthNoise
+from config.perception import DepthNoise, PerceptionConfig
+from hal.compiled import compiled
 from vision.depth.depth_mask import SurfaceDepth, surface_depth
 from vision.depth.depth_noise import depth_sigma_m, depth_sigma_of
 
-NOISE = DepthNoise()
+CONFIG = PerceptionConfig(min_depth_m=0.25, max_depth_m=10.0)
 MIDDLE = np.array([[40.0, 30.0]])
 
 
@@ -17,15 +18,20 @@ def flat(millimetres: int) -> NDArray[np.uint16]:
 
 
 def at_middle(depth: NDArray[np.uint16], pixels: NDArray[np.float64] = MIDDLE) -> SurfaceDepth:
-    return surface_depth(depth, 0.001, pixels, 0.25, 10.0, NOISE)
+    return surface_depth(depth, 0.001, pixels, CONFIG)
+
+
+@compiled("float64", DepthNoise)
+def one_sigma_m(depth_m: float, noise: DepthNoise) -> float:
+    return depth_sigma_of(depth_m, noise)
 
 
 def test_sigma_grows_with_the_square_of_depth() -> None:
     noise = DepthNoise(floor_m=0.01, quadratic_per_m=0.005)
     np.testing.assert_allclose(depth_sigma_m(np.array([0.0, 2.0, 10.0]), noise), [0.01, 0.03, 0.51])
-    assert depth_sigma_of(10.0, noise.floor_m, noise.quadratic_per_m) == pytest.approx(0.51)
+    assert one_sigma_m(10.0, noise) == pytest.approx(0.51)
     # The default is a real RealSense: 19 cm at 5 m.
-    assert depth_sigma_m(np.array([5.0]), NOISE)[0] == pytest.approx(0.19, abs=0.005)
+    assert depth_sigma_m(np.array([5.0]), DepthNoise())[0] == pytest.approx(0.19, abs=0.005)
 
 
 def test_an_end_on_one_surface_has_one_depth() -> None:
@@ -84,7 +90,7 @@ def test_the_limit_is_10_metres() -> None:
 
 def test_with_a_small_unit_depth_ends_where_16_bits_do() -> None:
     """65535 units of 0.1 mm are 6.55 m or anything beyond."""
-    found = [surface_depth(flat(raw), 1e-4, MIDDLE, 0.25, 10.0, NOISE).near_m[0] for raw in (65_000, 65_535)]
+    found = [surface_depth(flat(raw), 1e-4, MIDDLE, CONFIG).near_m[0] for raw in (65_000, 65_535)]
     assert found[0] == pytest.approx(6.5)
     assert np.isnan(found[1])
 
