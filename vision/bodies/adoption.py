@@ -12,7 +12,7 @@ from config.perception import DepthNoise
 from hal.compiled import compiled
 from hal.types import FloatArray
 from vision.bodies.tracks import Tracks
-from vision.depth.cells import nearest_cell
+from vision.depth.cells import cell_at
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import DepthGrid
 from vision.depth.depth_noise import depth_sigma_of
@@ -91,8 +91,6 @@ def _adopted(
     noise: DepthNoise,
 ) -> NDArray[np.int64]:
     """As adopt. is_long_static (N,): fragments that have been static for a while."""
-    height, width = labels.shape
-    offset_px, step_px = grid.offset_px, grid.step_px
     result = np.full(len(ends_px), -1, np.int64)
     for k in range(len(ends_px)):
         own_m = float(np.fmin(near_m[k, 0], near_m[k, 1]))
@@ -101,8 +99,8 @@ def _adopted(
         sigma_m = depth_sigma_of(own_m, noise)
         track, least, on_it = -1, np.inf, False
         for i in range(len(_ALONG)):
-            row = nearest_cell(v + down * _ALONG[i] - _ABOVE_PX[i], offset_px, step_px, height)
-            column = nearest_cell(u + across * _ALONG[i] + _BESIDE_PX[i], offset_px, step_px, width)
+            there_u, there_v = u + across * _ALONG[i] + _BESIDE_PX[i], v + down * _ALONG[i] - _ABOVE_PX[i]
+            row, column = cell_at(grid, there_u, there_v)
             there_m = grid.depth_m[row, column]
             gap_m = abs(there_m - own_m)
             if labels[row, column] == 0 or not gap_m <= _MIN_GATE_M + 2.0 * sigma_m:

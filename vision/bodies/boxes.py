@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from hal.compiled import compiled
 from hal.types import FloatArray
 from vision.bodies.sizes import NEARER_INVERSE, SEEN_THROUGH_HEIGHT, SEEN_THROUGH_SHARE
-from vision.depth.cells import nearest_cell
+from vision.depth.cells import cell_at
 from vision.depth.depth_grid import DepthGrid
 from vision.depth.regions import Regions
 
@@ -60,17 +60,15 @@ class Relations:
 
 def relations(regions: Regions, one: NDArray[np.intp], other: NDArray[np.intp]) -> Relations:
     """How regions one (K,) lie relative to regions other (K,), both as indices."""
-    return Relations(*_relations(regions.position_m, regions.extent_m, regions.bbox_px, one, other))
+    return Relations(*_relations(regions, one, other))
 
 
-@compiled("float64[:, :], float64[:, :], float64[:, :], int64[:], int64[:]")
+@compiled(Regions, "int64[:], int64[:]")
 def _relations(
-    position_m: FloatArray,
-    extent_m: FloatArray,
-    bbox_px: FloatArray,
-    one: NDArray[np.intp],
-    other: NDArray[np.intp],
+    regions: Regions, one: NDArray[np.intp], other: NDArray[np.intp]
 ) -> tuple[FloatArray, FloatArray, NDArray[np.bool_], NDArray[np.bool_]]:
+    """The fields of Relations."""
+    position_m, extent_m, bbox_px = regions.position_m, regions.extent_m, regions.bbox_px
     gap_m, overlap = np.empty(len(one)), np.empty(len(one))
     stacked, within = np.empty(len(one), np.bool_), np.empty(len(one), np.bool_)
     for k in range(len(one)):
@@ -124,31 +122,18 @@ def farther_between(
     return result
 
 
+@compiled(DepthGrid, Regions, "int64[:], int64[:]")
 def _cells_between(
     grid: DepthGrid, regions: Regions, one: NDArray[np.intp], other: NDArray[np.intp]
 ) -> NDArray[np.intp]:
     """(24, K) flat cells on the straight line in the image from the middle of region one[k] to other[k]'s."""
-    height, width = grid.depth_m.shape
-    return _on_the_line(regions.bbox_px, one, other, grid.offset_px, grid.step_px, height, width)
-
-
-@compiled("float64[:, :], int64[:], int64[:], float64, float64, int64, int64")
-def _on_the_line(
-    bbox_px: FloatArray,
-    one: NDArray[np.intp],
-    other: NDArray[np.intp],
-    offset_px: float,
-    step_px: float,
-    height: int,
-    width: int,
-) -> NDArray[np.intp]:
     cells = np.empty((_SAMPLES, len(one)), np.intp)
     for k in range(len(one)):
-        a, b = bbox_px[one[k]], bbox_px[other[k]]
+        a, b = regions.bbox_px[one[k]], regions.bbox_px[other[k]]
         u, v = 0.5 * (a[0] + a[2]), 0.5 * (a[1] + a[3])
         across, down = 0.5 * (b[0] + b[2]) - u, 0.5 * (b[1] + b[3]) - v
         for i in range(_SAMPLES):
             share = i / (_SAMPLES - 1)
-            row = nearest_cell(v + down * share, offset_px, step_px, height)
-            cells[i, k] = row * width + nearest_cell(u + across * share, offset_px, step_px, width)
+            row, column = cell_at(grid, u + across * share, v + down * share)
+            cells[i, k] = row * len(grid.x) + column
     return cells

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from config.perception import DepthNoise
 from hal.compiled import compiled
 from hal.types import Integers, Vector
-from vision.depth.cells import nearest_cell
+from vision.depth.cells import cell_at
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import BoolGrid, DepthGrid, FloatGrid
 
@@ -53,8 +53,7 @@ def near_ends(
 
     depth_m (N, 2): of the ends, NaN where it is not known.
     """
-    reach_at_1m = _AROUND_M * focal_px / grid.step_px
-    window = _window(ends_px, depth_m, search_area, reach_at_1m, grid.offset_px, grid.step_px)
+    window = _window(grid, ends_px, depth_m, search_area, _AROUND_M * focal_px / grid.step_px)
     if len(window.end_m) == 0:
         return np.zeros(grid.depth_m.shape, np.bool_)
     distance, label = cv2.distanceTransformWithLabels(
@@ -64,21 +63,20 @@ def near_ends(
         window,
         np.asarray(distance, np.float32),
         np.asarray(label, np.int32),
-        grid.depth_m,
+        grid,
         search_area,
         np.float32(grid.step_px / (_AROUND_M * focal_px)),
-        noise.quadratic_per_m,
+        noise,
     )
 
 
-@compiled("float32[:, :, :], float32[:, :], boolean[:, ::1], float64, float64, float64")
+@compiled(DepthGrid, "float32[:, :, :], float32[:, :], boolean[:, ::1], float64")
 def _window(
+    grid: DepthGrid,
     ends_px: NDArray[np.float32],
     depth_m: NDArray[np.float32],
     search_area: BoolGrid,
     reach_at_1m: float,
-    offset_px: float,
-    step_px: float,
 ) -> _Window:
     """The window of the ends whose depth is known; without ends if no cell of it is in search_area.
 
@@ -90,8 +88,8 @@ def _window(
     for n in range(len(depth_m)):
         for k in range(2):
             if np.isfinite(depth_m[n, k]):
-                rows[count] = nearest_cell(float(ends_px[n, k, 1]), offset_px, step_px, height)
-                columns[count] = nearest_cell(float(ends_px[n, k, 0]), offset_px, step_px, width)
+                u, v = float(ends_px[n, k, 0]), float(ends_px[n, k, 1])
+                rows[count], columns[count] = cell_at(grid, u, v)
                 end_m[count] = depth_m[n, k]
                 count += 1
     rows, columns, end_m = rows[:count], columns[:count], end_m[:count]
@@ -110,29 +108,29 @@ def _window(
     return _Window(seeds, top, left, rows[:count], columns[:count], end_m[:count])
 
 
-@compiled(_Window, "float32[:, ::1], int32[:, ::1], float32[:, ::1], boolean[:, ::1], float32, float64")
+@compiled(_Window, "float32[:, ::1], int32[:, ::1]", DepthGrid, "boolean[:, ::1], float32", DepthNoise)
 def _within_reach(
     window: _Window,
     distance: FloatGrid,
     label: IntGrid,
-    depth_m: FloatGrid,
+    grid: DepthGrid,
     search_area: BoolGrid,
     per_cell: np.float32,
-    quadratic_per_m: float,
+    noise: DepthNoise,
 ) -> BoolGrid:
     """As near_ends. distance (in cells) to the nearest end, and label of that end: in the window.
 
     per_cell: width of a cell at 1 m, as a share of _AROUND_M.
     """
     result, top, left = np.zeros(search_area.shape, np.bool_), window.top, window.left
-    nearest_m, agree_per_m = np.zeros(label.max() + 1), _AGREE_SIGMAS * quadratic_per_m
+    nearest_m, agree_per_m = np.zeros(label.max() + 1), _AGREE_SIGMAS * noise.quadratic_per_m
     for k in range(len(window.end_m)):
         nearest_m[label[window.rows[k], window.columns[k]]] = window.end_m[k]
     for i in range(label.shape[0]):
         for j in range(label.shape[1]):
             if search_area[top + i, left + j]:
                 there_m = nearest_m[label[i, j]]
-                off_m = abs(depth_m[top + i, left + j] - there_m)
+                off_m = abs(grid.depth_m[top + i, left + j] - there_m)
                 close = distance[i, j] * per_cell * there_m <= 1.0
                 result[top + i, left + j] = close and off_m <= _AGREE_M + agree_per_m * there_m * there_m
     return result

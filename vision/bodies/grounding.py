@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from config.perception import DepthNoise
 from hal.compiled import compiled
 from vision.depth.connected import IntGrid
-from vision.depth.depth_grid import DepthGrid, FloatGrid
+from vision.depth.depth_grid import DepthGrid
 from vision.depth.regions import Regions, exchanged, measure
 from vision.numerics.order import median_of
 
@@ -46,7 +46,7 @@ def extend_to_floor(
     standing = np.concatenate(([False], ~mover))
     result, grown = labels, np.zeros(len(mover), np.bool_)
     for track in (chosen & (measured.cells > 0)).nonzero()[0].tolist():
-        below = _below(grid.depth_m, grid.y, labels, track + 1, standing, noise.quadratic_per_m)
+        below = _below(grid, labels, track + 1, standing, noise)
         if len(below):
             result = labels.copy() if result is labels else result
             result.ravel()[below] = track + 1
@@ -56,20 +56,15 @@ def extend_to_floor(
     return result, exchanged(measured, measure(grid, result, len(mover)), grown)
 
 
-@compiled("float32[:, ::1], float32[::1], int32[:, ::1], int64, boolean[::1], float64")
+@compiled(DepthGrid, "int32[:, ::1], int64, boolean[::1]", DepthNoise)
 def _below(
-    depth_m: FloatGrid,
-    ray_y: FloatGrid,
-    labels: IntGrid,
-    label: int,
-    standing: NDArray[np.bool_],
-    quadratic_per_m: float,
+    grid: DepthGrid, labels: IntGrid, label: int, standing: NDArray[np.bool_], noise: DepthNoise
 ) -> NDArray[np.intp]:
     """Flat cells below those with label that belong to it, column by column.
 
     standing: for each label, whether cells may be taken from it.
     """
-    height, width = labels.shape
+    (height, width), depth_m = labels.shape, grid.depth_m
     # Its first and last row, and its lowest row in each column.
     top, bottom, foot = height, -1, np.full(width, height, np.intp)
     for i in range(height):
@@ -81,7 +76,7 @@ def _below(
         return taken[:0]
     lowest_rows = slice(bottom - (bottom - top + 1) // _LOWEST, bottom + 1)
     own_m = median_of(depth_m[lowest_rows].ravel()[labels[lowest_rows].ravel() == label])
-    same_m = np.float32(_SAME_M + _SAME_SIGMAS * quadratic_per_m * own_m * own_m)
+    same_m = np.float32(_SAME_M + _SAME_SIGMAS * noise.quadratic_per_m * own_m * own_m)
     count, lowest = 0, 0
     for j in range(width):
         for i in range(foot[j] + 1, height):
@@ -94,6 +89,6 @@ def _below(
                 taken[count] = i * width + j
                 count, lowest = count + 1, max(lowest, i)
     # The lowest cell of all columns counts: it may stand on one foot only.
-    if (ray_y[lowest] - ray_y[bottom]) * own_m < np.float32(_MIN_GAIN_M):
+    if (grid.y[lowest] - grid.y[bottom]) * own_m < np.float32(_MIN_GAIN_M):
         return taken[:0]
     return taken[:count]

@@ -54,15 +54,13 @@ NO_TRACK_SURFACES = TrackSurfaces(
 
 def surfaces(grid: DepthGrid, labels: IntGrid, ids: NDArray[np.int64], pose: Pose) -> TrackSurfaces:
     """The surfaces of tracks with ids (T,). labels (h, w): track index + 1 of each cell, 0 for none."""
-    return TrackSurfaces(*_points_of(grid.depth_m, grid.x, grid.y, labels), ids, pose)
+    return TrackSurfaces(*_points_of(grid, labels), ids, pose)
 
 
-@compiled("float32[:, ::1], float32[::1], float32[::1], int32[:, ::1]")
-def _points_of(
-    depth_m: FloatGrid, ray_x: FloatGrid, ray_y: FloatGrid, labels: IntGrid
-) -> tuple[FloatGrid, NDArray[np.int32]]:
+@compiled(DepthGrid, "int32[:, ::1]")
+def _points_of(grid: DepthGrid, labels: IntGrid) -> tuple[FloatGrid, NDArray[np.int32]]:
     """points_m (3, K) of all labelled cells and their owner (K,), label - 1."""
-    height, width = labels.shape
+    (height, width), depth_m = labels.shape, grid.depth_m
     count = np.count_nonzero(labels)
     points_m, owner = np.empty((3, count), np.float32), np.empty(count, np.int32)
     k = 0
@@ -70,7 +68,7 @@ def _points_of(
         for j in range(width):
             if labels[i, j] == 0:
                 continue
-            points_m[0, k], points_m[1, k] = ray_x[j] * depth_m[i, j], ray_y[i] * depth_m[i, j]
+            points_m[0, k], points_m[1, k] = grid.x[j] * depth_m[i, j], grid.y[i] * depth_m[i, j]
             points_m[2, k], owner[k] = depth_m[i, j], labels[i, j] - 1
             k += 1
     return points_m, owner

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hal.compiled import inlined
-from vision.depth.depth_grid import FloatGrid
+from vision.depth.depth_grid import DepthGrid, FloatGrid
 
 # Rays x and y of the first column and row, and how many columns and rows there are per unit of these.
 Lattice = tuple[np.float32, np.float32, np.float32, np.float32]
@@ -15,6 +15,14 @@ Lattice = tuple[np.float32, np.float32, np.float32, np.float32]
 def nearest_cell(pixel: float, offset_px: float, step_px: float, count: int) -> int:
     """The row of a pixel's v, or the column of its u, in a grid of count; clamped at the border."""
     return min(max(int(np.rint((pixel - offset_px) / step_px)), 0), count - 1)
+
+
+@inlined
+def cell_at(grid: DepthGrid, u: float, v: float) -> tuple[int, int]:
+    """Row and column of the cell of a pixel; clamped at the border."""
+    height, width = grid.depth_m.shape
+    row = nearest_cell(v, grid.offset_px, grid.step_px, height)
+    return row, nearest_cell(u, grid.offset_px, grid.step_px, width)
 
 
 @inlined

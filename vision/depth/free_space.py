@@ -151,31 +151,15 @@ def _known_m(
         return np.zeros(len(bands)), 0.0
     unmeasured = int(np.count_nonzero(floor.depth_m < measurable_from_m))
     hidden = int(np.count_nonzero(floor.forward_m < grid.hidden_m))
-    first = _first_hole(
-        grid.valid,
-        grid.beyond,
-        grid.depth_m,
-        grid.own,
-        bands.cells,
-        bands.width,
-        floor.limit_m,
-        unmeasured,
-        hidden,
-    )
+    first = _first_hole(grid, bands.cells, bands.width, floor.limit_m, unmeasured, hidden)
     # With a hole in the lowest row nothing is known, since nothing nearer is in view.
     known: FloatArray = np.where(first == 0, 0.0, floor.reach_m[first])
     return known, float(floor.forward_m[unmeasured - 1]) if unmeasured else 0.0
 
 
-@compiled(
-    "boolean[:, ::1], boolean[:, ::1], float32[:, ::1], boolean[:, ::1], int32[:, ::1], int64, float32[::1]",
-    "int64, int64",
-)
+@compiled(DepthGrid, "int32[:, ::1], int64, float32[::1], int64, int64")
 def _first_hole(
-    valid: BoolGrid,
-    beyond: BoolGrid,
-    depth_m: FloatGrid,
-    own: BoolGrid,
+    grid: DepthGrid,
     cells: NDArray[np.int32],
     width: int,
     limit_m: NDArray[np.float32],
@@ -188,13 +172,14 @@ def _first_hole(
     holes, or at a hole in the last row. It is 0 if some rows are unmeasured and none before the hole shows
     floor.
 
-    limit_m (k,): maximum depth of floor in the lowest k rows. unmeasured: the number of these that are too
-    near to be measured. In them cells without data are no hole; measured cells count as elsewhere.
-    own (h, w), or (0, 0): cells that show the robot itself. In the lowest rows, as many as hidden, a row of
-    these is no hole either, if floor is seen beyond it; else the floor ends before it.
+    cells, width: see LevelBands. limit_m (k,): maximum depth of floor in the lowest k rows. unmeasured: the
+    number of these that are too near to be measured. In them cells without data are no hole; measured cells
+    count as elsewhere. hidden: the number of rows in which own parts may hide floor. There a row of own cells
+    is no hole either, if floor is seen beyond it; else the floor ends before it.
     """
-    bands, rows, has_own = cells.shape[1] // width, len(limit_m), len(own) > 0
-    depth, is_valid, is_beyond, is_own = depth_m.ravel(), valid.ravel(), beyond.ravel(), own.ravel()
+    bands, rows, has_own = cells.shape[1] // width, len(limit_m), len(grid.own) > 0
+    depth, is_own = grid.depth_m.ravel(), grid.own.ravel()
+    is_valid, is_beyond = grid.valid.ravel(), grid.beyond.ravel()
     result = np.empty(bands, np.intp)
     for band in range(bands):
         seen_to, shown, before = 0, False, False
