@@ -58,9 +58,15 @@ class _Pairs:
     small, large: their indices.
     small_px, large_px: their boxes in the image, u0, v0, u1, v1, (K, 4).
     gap_m, stacked, within: see Relations.
+    away_m: difference of their depths.
     overlapping: at least half of the small box is within the large one in the image.
     size_plausible: by their sizes they could be one body.
+    tiny: the small one is, compared with the large one.
+    wide: one of the two is wider than a person.
     person_width: together they are no wider than a single person.
+    moves: the large one does, faster than anything static seems to.
+    slower_mps: speed of the slower one.
+    differ_mps: difference of their velocities.
     velocities_compatible: their velocities do not contradict each other.
     velocities_close, velocities_equal: their velocities are well known, and differ by _CLOSE_MPS or
         _EQUAL_MPS at most.
@@ -73,9 +79,15 @@ class _Pairs:
     gap_m: FloatArray
     stacked: BoolArray
     within: BoolArray
+    away_m: FloatArray
     overlapping: BoolArray
     size_plausible: BoolArray
+    tiny: BoolArray
+    wide: BoolArray
     person_width: BoolArray
+    moves: BoolArray
+    slower_mps: FloatArray
+    differ_mps: FloatArray
     velocities_compatible: BoolArray
     velocities_close: BoolArray
     velocities_equal: BoolArray
@@ -98,17 +110,15 @@ def pairs_to_merge(
     if len(small) == 0:
         return []
     pairs = _paired(regions, velocity_mps, sigma_mps, small, large)
-    one = _beside(pairs) | _carried(pairs) | _seen_through(pairs) | _trolley(pairs)
-    one |= _wheel(pairs, regions.cells, velocity_mps)
-    halves = _halves(pairs, regions, velocity_mps) & ~one
+    one = _beside(pairs) | _carried(pairs) | _seen_through(pairs) | _trolley(pairs) | _wheel(pairs)
+    halves = _halves(pairs) & ~one
     if halves.any():
         halves &= nearer_between(grid, regions, small, large)
-    pieces = (_pieces(pairs, regions, velocity_mps) | _above(pairs, regions) | halves) & ~one
+    pieces = (_pieces(pairs) | _above(pairs) | halves) & ~one
     if pieces.any():
         one |= pieces & ~farther_between(grid, regions, small, large)
     small, large = small[one], large[one]
-    away = np.abs(regions.position_m[small, 2] - regions.position_m[large, 2])
-    closest_first = np.lexsort((away, pairs.gap_m[one]))
+    closest_first = np.lexsort((pairs.away_m[one], pairs.gap_m[one]))
     return list(zip(small[closest_first].tolist(), large[closest_first].tolist(), strict=True))
 
 
@@ -133,8 +143,8 @@ def _paired(
     large: NDArray[np.intp],
 ) -> _Pairs:
     box, cells = boxes(regions), regions.cells
-    small_px, large_px = regions.bbox_px[small], regions.bbox_px[large]
-    difference = np.sqrt(np.square(velocity_mps[small] - velocity_mps[large]).sum(axis=1))
+    squared_mps = np.square(velocity_mps).sum(axis=1)
+    differ_mps = np.sqrt(np.square(velocity_mps[small] - velocity_mps[large]).sum(axis=1))
     spread = np.hypot(sigma_mps[small], sigma_mps[large])
     known = np.maximum(sigma_mps[small], sigma_mps[large]) <= _KNOWN_SIGMA_MPS
     right_m = np.maximum(box.high_m[small, 0], box.high_m[large, 0])
@@ -145,17 +155,23 @@ def _paired(
     return _Pairs(
         small,
         large,
-        small_px,
-        large_px,
+        regions.bbox_px[small],
+        regions.bbox_px[large],
         gap_m=relation.gap_m,
         stacked=relation.stacked,
         within=relation.within,
+        away_m=np.abs(regions.position_m[small, 2] - regions.position_m[large, 2]),
         overlapping=overlapping,
         size_plausible=(cells[small] <= _SMALL_SHARE * cells[large]) | person_width | overlapping,
+        tiny=cells[small] <= _TINY_SHARE * cells[large],
+        wide=np.maximum(regions.extent_m[small, 0], regions.extent_m[large, 0]) > SINGLE_WIDTH_M,
         person_width=person_width,
-        velocities_compatible=difference <= _CLOSE_MPS + _COMPATIBLE_SIGMAS * spread,
-        velocities_close=known & (difference <= _CLOSE_MPS),
-        velocities_equal=known & (difference <= _EQUAL_MPS),
+        moves=squared_mps[large] > _MIN_MOVING_MPS**2,
+        slower_mps=np.sqrt(np.minimum(squared_mps[small], squared_mps[large])),
+        differ_mps=differ_mps,
+        velocities_compatible=differ_mps <= _CLOSE_MPS + _COMPATIBLE_SIGMAS * spread,
+        velocities_close=known & (differ_mps <= _CLOSE_MPS),
+        velocities_equal=known & (differ_mps <= _EQUAL_MPS),
     )
 
 
@@ -181,68 +197,47 @@ def _trolley(pairs: _Pairs) -> BoolArray:
     return pairs.velocities_close & (rows <= LOW_BESIDE * rows_beside) & (pairs.gap_m <= _TOUCHING_M)
 
 
-def _wheel(pairs: _Pairs, cells: NDArray[np.intp], velocity_mps: FloatArray) -> BoolArray:
+def _wheel(pairs: _Pairs) -> BoolArray:
     """(K,) a wheel of a cart: tiny compared with the mover, close to it, with exactly the same velocity."""
-    moves = np.square(velocity_mps[pairs.large]).sum(axis=1) > _MIN_MOVING_MPS**2
-    tiny = cells[pairs.small] <= _TINY_SHARE * cells[pairs.large]
-    result: BoolArray = tiny & moves & pairs.velocities_equal & (pairs.gap_m <= _PIECES_M)
-    return result
+    return pairs.tiny & pairs.moves & pairs.velocities_equal & (pairs.gap_m <= _PIECES_M)
 
 
-def _pieces(pairs: _Pairs, regions: Regions, velocity_mps: FloatArray) -> BoolArray:
+def _pieces(pairs: _Pairs) -> BoolArray:
     """(K,) pieces of a vehicle: wider than a person, with exactly the same velocity.
 
     They are one body if nothing farther is seen between them: of the plain side of a vehicle a depth camera
     sees only the edges.
     """
-    moves = np.square(velocity_mps[pairs.large]).sum(axis=1) > _MIN_MOVING_MPS**2
-    result: BoolArray = pairs.velocities_equal & moves & _wide(pairs, regions) & (pairs.gap_m <= _PIECES_M)
-    return result
+    return pairs.wide & pairs.moves & pairs.velocities_equal & (pairs.gap_m <= _PIECES_M)
 
 
-def _halves(pairs: _Pairs, regions: Regions, velocity_mps: FloatArray) -> BoolArray:
+def _halves(pairs: _Pairs) -> BoolArray:
     """(K,) halves of a vehicle behind a pillar: wider than a person, side by side at one depth.
 
     Their velocities do not contradict each other. They are one body if something nearer, and nothing farther,
     is seen between them.
     """
-    small_px, large_px = pairs.small_px, pairs.large_px
-    shared_px = np.minimum(small_px[:, 3], large_px[:, 3]) - np.maximum(small_px[:, 1], large_px[:, 1])
-    lower_px = np.minimum(small_px[:, 3] - small_px[:, 1], large_px[:, 3] - large_px[:, 1])
-    differ_mps = np.sqrt(np.square(velocity_mps[pairs.small] - velocity_mps[pairs.large]).sum(axis=1))
-    speed_mps = np.sqrt(np.square(velocity_mps).sum(axis=1))
-    slower_mps = np.minimum(speed_mps[pairs.small], speed_mps[pairs.large])
-    alike = pairs.velocities_compatible & (differ_mps <= np.minimum(_HALVES_MPS, _HALVES_SHARE * slower_mps))
-    away_m = np.abs(regions.position_m[pairs.small, 2] - regions.position_m[pairs.large, 2])
-    close = (
-        (shared_px >= _MIN_OVERLAP_SHARE * lower_px) & (away_m <= _SAME_DEPTH_M) & (pairs.gap_m <= _HIDDEN_M)
-    )
-    result: BoolArray = alike & close & (slower_mps > _MIN_MOVING_MPS) & _wide(pairs, regions)
-    return result
+    most_mps = np.minimum(_HALVES_MPS, _HALVES_SHARE * pairs.slower_mps)
+    alike = pairs.velocities_compatible & (pairs.differ_mps <= most_mps)
+    close = _overlap_along(pairs, 1) & (pairs.away_m <= _SAME_DEPTH_M) & (pairs.gap_m <= _HIDDEN_M)
+    return alike & close & (pairs.slower_mps > _MIN_MOVING_MPS) & pairs.wide
 
 
-def _wide(pairs: _Pairs, regions: Regions) -> BoolArray:
-    """(K,) whether one of the two is wider than a person."""
-    widest_m = np.maximum(regions.extent_m[pairs.small, 0], regions.extent_m[pairs.large, 0])
-    result: BoolArray = widest_m > SINGLE_WIDTH_M
-    return result
-
-
-def _above(pairs: _Pairs, regions: Regions) -> BoolArray:
+def _above(pairs: _Pairs) -> BoolArray:
     """(K,) pieces of a person, one above the other, together no wider than a person.
 
     Their velocities do not contradict each other. They are one body if nothing farther is seen between them.
     """
-    small_px, large_px = pairs.small_px, pairs.large_px
-    shared_px = np.minimum(small_px[:, 2], large_px[:, 2]) - np.maximum(small_px[:, 0], large_px[:, 0])
-    narrower_px = np.minimum(small_px[:, 2] - small_px[:, 0], large_px[:, 2] - large_px[:, 0])
-    away_m = np.abs(regions.position_m[pairs.small, 2] - regions.position_m[pairs.large, 2])
-    over = (
-        (shared_px >= _MIN_OVERLAP_SHARE * narrower_px)
-        & (away_m <= _SAME_DEPTH_M)
-        & (pairs.gap_m <= _PARTED_M)
-    )
-    result: BoolArray = over & pairs.person_width & pairs.velocities_compatible
+    over = _overlap_along(pairs, 0) & (pairs.away_m <= _SAME_DEPTH_M) & (pairs.gap_m <= _PARTED_M)
+    return over & pairs.person_width & pairs.velocities_compatible
+
+
+def _overlap_along(pairs: _Pairs, axis: int) -> BoolArray:
+    """(K,) pairs whose boxes overlap along an axis of the image, 0 (u) or 1 (v), by much of the shorter."""
+    small, large = pairs.small_px[:, axis::2], pairs.large_px[:, axis::2]
+    shared_px = np.minimum(small[:, 1], large[:, 1]) - np.maximum(small[:, 0], large[:, 0])
+    shorter_px = np.minimum(small[:, 1] - small[:, 0], large[:, 1] - large[:, 0])
+    result: BoolArray = shared_px >= _MIN_OVERLAP_SHARE * shorter_px
     return result
 
 
