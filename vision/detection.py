@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hal.types import Intrinsics, Pose
+from hal.types import FloatArray, Intrinsics, Pose
 from vision.depth.depth_grid import DepthGrid
 from vision.ego_motion.camera_motion import MIN_AGREEMENT, CameraEstimate
 from vision.ego_motion.motion_prior import MotionPrior
@@ -89,6 +89,11 @@ class Detection:
     reckoned: bool
     blurred: bool
     floor: SeenFloor | None = None
+
+    @property
+    def floor_normal(self) -> FloatArray | None:
+        """(3,) the floor's normal in the fixed frame; None where the floor is not known."""
+        return None if self.grid.up is None else np.asarray(self.pose.rotation @ self.grid.up)
 
 
 def camera_motion_of(found: CameraEstimate, step: Pose, dt_s: float, prior: MotionPrior) -> CameraMotion:

@@ -89,7 +89,7 @@ class Tracker:
             self._rims.clear()
         elapsed_s = 0.0 if self._last_ns is None else (detection.captured_ns - self._last_ns) * 1e-9
         elapsed_s = min(max(elapsed_s, 0.0), self._config.max_gap_s)
-        tracks.predict(elapsed_s, _ACCEL_DENSITY, sightings.floor_normal(detection))
+        tracks.predict(elapsed_s, _ACCEL_DENSITY, detection.floor_normal)
         before_ns = detection.captured_ns if self._last_ns is None else self._last_ns
         self._last_ns = max(detection.captured_ns, before_ns)
         owner = inherited(self._fragment_ids, self._fragment_owner, detection.ids, tracks.ids)
@@ -173,20 +173,20 @@ class Tracker:
         """(h, w) track index + 1 of each cell, by the cells of all tracks in the frame before; births."""
         tracks, grid, pose = self._tracks, detection.grid, detection.pose
         mover = tracks.mover
-        shift = np.where(mover[:, None], tracks.state[:, 3:] * elapsed_s, 0.0)
+        shift = np.where(mover[:, None], tracks.velocity_mps * elapsed_s, 0.0)
         index = tracks.index_of(self._surfaces.track_id)
         predicted = masks.predict(self._surfaces, index, shift, grid, pose)
         count, parts = connected.components(grid, above_floor)
         measured = regions.measure(grid, parts, count)
         ballot = votes.count_votes(parts, count, predicted, len(tracks), mover)
         sight, distance_m = tracks.sight(pose.translation_m)
-        overdue = tracks.overdue(changes.stayed_s, sight, self._free.resolves_m(distance_m))
+        overdue = votes.overdue_movers(tracks, changes.stayed_s, sight, self._free.resolves_m(distance_m))
         ballot, hidden = votes.drop_overdue_movers(ballot, parts, predicted, changes.stayed, overdue, mover)
         tracks.mark_hidden(hidden)
         newly_arrived = masks.count_cells(parts, changes.arrived_cells, count)
         ballot = votes.drop_static_from_arrived(ballot, measured.cells, newly_arrived, mover)
         tracks.border_is_guess = votes.border_is_guess(ballot, mover)
-        bodies = sightings.expected_bodies(tracks, pose, self._config.depth_noise)
+        bodies = grouping.expected_bodies(tracks, pose, self._config.depth_noise)
         expected = grouping.expected_in(grid, measured, ballot.winner, ballot.votes, bodies, mover)
         winner = grouping.detach(ballot.winner, measured, ballot.votes, expected)
         alive = mover | tracks.ever_moved
@@ -210,7 +210,7 @@ class Tracker:
             velocities.per_end,
             np.repeat(index, 2),
             len(tracks),
-            tracks.state[:, 3:] @ rotation,
+            tracks.velocity_mps @ rotation,
             max_mps,
         )
         use = limbs.believable(body).nonzero()[0]

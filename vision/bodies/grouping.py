@@ -1,7 +1,7 @@
 """Correction of which whole parts belong to which track, where connected depth says too little.
 
 * expected_in: something nearer, a post for example, may divide a mover in the image. The piece on the other
-  side of it is still part of the mover.
+  side of it is still part of the mover, if it is where the body is expected (expected_bodies).
 * detach: a part far from the main part of its track leaves the track, unless it is expected there or is a
   load that stands on the main part.
 * attach: a hole in the depth image may separate a shoe, an arm or a load from its body. A small new part
@@ -18,11 +18,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from config.perception import DepthNoise
 from hal.compiled import compiled
-from hal.types import Matrix, Vector
+from hal.types import FloatArray, Matrix, Pose, Vector
 from vision.bodies.boxes import LOAD_GAP_M, SEEN_THROUGH_GAP_M, nearer_between, relations
+from vision.bodies.tracks import Tracks
 from vision.depth.depth_grid import DepthGrid
+from vision.depth.depth_noise import depth_sigma_of
 from vision.depth.regions import Regions
+from vision.numerics.pose_axes import inner_point
 
 _APART_M = 0.40  # parts farther than this from the main part belong to something else
 _CLOSE_M = 0.25  # gap that missing depth at a shoe or under an arm leaves: about the length of a hand
@@ -46,6 +50,24 @@ class ExpectedBodies:
     extent_m: Matrix
     box_m: Matrix
     sigma_m: Vector
+
+
+def expected_bodies(tracks: Tracks, pose: Pose, noise: DepthNoise) -> ExpectedBodies:
+    """Where the bodies of tracks are expected in the axes of a camera at pose."""
+    centre_m, sigma_m = _expected(tracks, pose, noise)
+    return ExpectedBodies(centre_m, tracks.extent_m, tracks.box_m, sigma_m)
+
+
+@compiled(Tracks, Pose, DepthNoise)
+def _expected(tracks: Tracks, pose: Pose, noise: DepthNoise) -> tuple[FloatArray, FloatArray]:
+    """centre_m and sigma_m of ExpectedBodies."""
+    count = len(tracks.state)
+    centre_m, sigma_m = np.empty((count, 3)), np.empty(count)
+    for t in range(count):
+        centre_m[t] = inner_point(pose, tracks.state[t, :3])
+        depth_m = max(centre_m[t, 2], 0.0)
+        sigma_m[t] = depth_sigma_of(depth_m, noise)
+    return centre_m, sigma_m
 
 
 def expected_in(

@@ -67,7 +67,7 @@ def cuts(
     gone = asked & (tracks.speed_mps * stayed_s >= _MIN_DISPLACEMENT_M)
     if not gone.any():
         return []
-    left = _left_behind(grid, labels, on_mover, stayed, tracks.state[:, 3:] * stayed_s, gone, pose)
+    left = _left_behind(grid, labels, on_mover, stayed, tracks.velocity_mps * stayed_s, gone, pose)
     cells = np.bincount(left.ravel(), minlength=len(gone) + 1)[1:]
     of_track = np.bincount(labels.ravel(), minlength=len(gone) + 1)[1:]
     parted = (cells >= np.maximum(MIN_CELLS, _LEAST_SHARE * of_track)) & (cells <= _MOST_SHARE * of_track)

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from config.perception import DepthNoise
 from hal.compiled import compiled
 from hal.types import Flags, FloatArray, Integers, Matrices, Matrix, Vector
-from vision.bodies import sightings
 from vision.bodies.approach import Approach
 from vision.bodies.rim_motion import RimVelocities
 from vision.bodies.tracks import Tracks
@@ -127,7 +126,7 @@ def evidence_of(
         sight=sight,
         distance_m=distance_m,
         depth_sigma_m=np.asarray(depth_sigma_m(distance_m, noise), np.float64),
-        velocity=tracks.state[:, 3:],
+        velocity=tracks.velocity_mps,
         covariance=tracks.covariance[:, 3:, 3:],
         own_velocity=body.velocity_mps @ rotation.T,
         own_covariance=rotation @ body.covariance @ rotation.T,
@@ -148,7 +147,7 @@ def evidence_of(
         approach_mps=approach.mps,
         approach_s=tracks.approach_s,
         growth_mps=tracks.growth_mps,
-        up=sightings.floor_normal(detection),
+        up=detection.floor_normal,
         view_radps=view_radps(detection, sight, distance_m),
         advances=advances,
         border_is_guess=tracks.border_is_guess,

@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 from config.perception import DepthNoise
 from hal.compiled import compiled
 from hal.types import FloatArray, Intrinsics, Pose
-from vision.bodies.grouping import ExpectedBodies
 from vision.bodies.tracks import Tracks
 from vision.camera.lens import ray_through
 from vision.depth.connected import MIN_PART_CELLS
@@ -31,7 +30,7 @@ from vision.depth.depth_noise import depth_sigma_of
 from vision.depth.regions import Regions
 from vision.detection import Detection
 from vision.numerics import kalman
-from vision.numerics.pose_axes import inner_point, outer_point
+from vision.numerics.pose_axes import outer_point
 
 # Standard deviation of the centroid of a very small surface: the width of a cell 2.3 m away.
 _CENTRE_SIGMA_M = 0.015
@@ -187,30 +186,6 @@ def _boxes_m(
             right, lower = ray_through(camera, u1, v1)
             result[t] = left * z - x, upper * z - y, right * z - x, lower * z - y
     return result
-
-
-def expected_bodies(tracks: Tracks, pose: Pose, noise: DepthNoise) -> ExpectedBodies:
-    """Where the bodies of tracks are expected in the axes of a camera at pose."""
-    centre_m, sigma_m = _expected(tracks, pose, noise)
-    return ExpectedBodies(centre_m, tracks.extent_m, tracks.box_m, sigma_m)
-
-
-@compiled(Tracks, Pose, DepthNoise)
-def _expected(tracks: Tracks, pose: Pose, noise: DepthNoise) -> tuple[FloatArray, FloatArray]:
-    """centre_m and sigma_m of ExpectedBodies."""
-    count = len(tracks.state)
-    centre_m, sigma_m = np.empty((count, 3)), np.empty(count)
-    for t in range(count):
-        centre_m[t] = inner_point(pose, tracks.state[t, :3])
-        depth_m = max(centre_m[t, 2], 0.0)
-        sigma_m[t] = depth_sigma_of(depth_m, noise)
-    return centre_m, sigma_m
-
-
-def floor_normal(detection: Detection) -> FloatArray | None:
-    """(3,) the floor's normal in the fixed frame; None where the floor is not known."""
-    normal = detection.grid.up
-    return None if normal is None else np.asarray(detection.pose.rotation @ normal)
 
 
 def _at_border(bbox_px: FloatArray, detection: Detection) -> NDArray[np.bool_]:

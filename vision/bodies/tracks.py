@@ -23,8 +23,6 @@ _TRAIL_S = 0.3  # time constant of the trailing average of a centre: several fra
 # A track really advances if its centre advances at this share of the filtered velocity at least. The centre
 # of something static does not advance; its filtered velocity is noise.
 _MIN_ADVANCE_SHARE = 0.4
-_UNPROVEN_S = 0.05  # a frame or two: for that long proof may be missing by chance
-_LEFT_SHARE = 0.6  # of its width: a track displaced by more has clearly left its former place
 
 _Estimates = tuple[FloatArray, FloatArray]  # states (K, 6) and covariances (K, 6, 6)
 
@@ -88,6 +86,11 @@ class Tracks:
     def mover(self) -> NDArray[np.bool_]:
         """(T,) tracks that move by the verdict, or have evidence of it."""
         return self.moving | (self.evidence > 0.0)
+
+    @property
+    def velocity_mps(self) -> FloatArray:
+        """(T, 3) filtered velocity; a view of the state."""
+        return self.state[:, 3:]
 
     @property
     def speed_mps(self) -> FloatArray:
@@ -181,17 +184,6 @@ class Tracks:
         """(T, 3) unit vectors from a camera at camera_m (3,) to the centres, and (T,) their distances."""
         return _sight(self.state, camera_m)
 
-    def overdue(self, elapsed_s: float, sight: FloatArray, resolves_m: FloatArray) -> NDArray[np.bool_]:
-        """(T,) movers without recent proof of motion that must have left their place of elapsed_s ago.
-
-        By their velocity they have moved across the line of sight by most of their width, or along it by what
-        depth can resolve there, resolves_m (T,). sight (T, 3): unit vectors from the camera to the tracks.
-        """
-        if elapsed_s <= 0.0:
-            return np.zeros(len(self), np.bool_)
-        asked = self.moving & (self.unproven_s >= _UNPROVEN_S)
-        return _must_have_left(self, asked, sight, resolves_m, elapsed_s)
-
     def update_durations(self, proven: NDArray[np.bool_], dt_s: float) -> None:
         """Update the durations after a verdict, dt_s after the last. proven (T,): motion, by this frame."""
         self.unproven_s = np.where(proven, 0.0, self.unproven_s + dt_s)
@@ -279,22 +271,3 @@ def _sight(state: FloatArray, camera_m: FloatArray) -> tuple[FloatArray, FloatAr
         distance_m[t] = math.sqrt(squared)
         sight[t] /= max(distance_m[t], 0.1)
     return sight, distance_m
-
-
-@compiled(Tracks, "boolean[::1], float64[:, ::1], float64[::1], float64")
-def _must_have_left(
-    tracks: Tracks, asked: NDArray[np.bool_], sight: FloatArray, resolves_m: FloatArray, elapsed_s: float
-) -> NDArray[np.bool_]:
-    """(T,) of the tracks asked (T,), those that must have left their place of elapsed_s ago."""
-    gone = np.zeros(len(asked), np.bool_)
-    for t in range(len(asked)):
-        along_m, squared = 0.0, 0.0
-        for i in range(3):
-            displacement_m = elapsed_s * tracks.state[t, 3 + i]
-            along_m += displacement_m * sight[t, i]
-            squared += displacement_m * displacement_m
-        across_m = math.sqrt(max(squared - along_m * along_m, 0.0))
-        width_m, depth_m = max(tracks.extent_m[t, 0], tracks.extent_m[t, 2]), tracks.extent_m[t, 2]
-        far = across_m >= _LEFT_SHARE * width_m or abs(along_m) >= max(resolves_m[t], _LEFT_SHARE * depth_m)
-        gone[t] = asked[t] and far
-    return gone

@@ -4,8 +4,9 @@ The cells that each track is predicted to cover (predict of vision/bodies/masks.
 
 1. count_votes: each predicted cell is one vote of its track for the connected part in which it lies. A few
    stray votes do not count, and of several static tracks in a part only the one with the most votes stays.
-2. drop_overdue_movers, an exception: a mover that must have moved on loses a part that was there before and
-   that a static track claims as well. The mover has gone behind the static surface, at about its depth.
+2. drop_overdue_movers, an exception: a mover that must have moved on (overdue_movers) loses a part that was
+   there before and that a static track claims as well. The mover has gone behind the static surface, at
+   about its depth.
 3. drop_static_from_arrived, another exception: a static track loses a part that has newly arrived if the rest
    of the track was there before. Somebody who stood beside furniture, as one part with it, has left it.
 4. divide: a part that one track claims goes to that track as a whole. A part that several tracks claim (at
@@ -16,13 +17,16 @@ Between 3 and 4, vision/bodies/grouping.py corrects the winners of whole parts.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hal.compiled import compiled
+from hal.types import FloatArray
 from vision.bodies.arrivals import MUCH_ARRIVED_CELLS
+from vision.bodies.tracks import Tracks
 from vision.depth.connected import IntGrid, spread_labels
 from vision.depth.depth_grid import BoolGrid
 
@@ -37,6 +41,8 @@ _SHARE_OF_TRACK = 0.30
 # who leaves furniture emerges with one side first.
 _ARRIVED_SHARE = 0.3
 _LEAVING_SHARE = 0.75  # of a static track's cells: a larger part is the static thing itself and cannot leave
+_UNPROVEN_S = 0.05  # a frame or two: for that long proof may be missing by chance
+_LEFT_SHARE = 0.6  # of its width: a mover displaced by more has clearly left its former place
 _STAYED_SHARE = 0.7  # of a mover's votes must be for cells that have stayed; the others lie at the rims
 
 
@@ -154,6 +160,39 @@ def drop_static_from_arrived(
     leaves = ~mover & (rest > 0)
     left = ballot.claims & leaves & newly_arrived[:, None] & (cells[:, None] <= _LEAVING_SHARE * whole)
     return elect(ballot.claims & ~left, ballot.votes_of)
+
+
+def overdue_movers(
+    tracks: Tracks, elapsed_s: float, sight: FloatArray, resolves_m: FloatArray
+) -> NDArray[np.bool_]:
+    """(T,) movers without recent proof of motion that must have left their place of elapsed_s ago.
+
+    By their velocity they have moved across the line of sight by most of their width, or along it by what
+    depth can resolve there, resolves_m (T,). sight (T, 3): unit vectors from the camera to the tracks.
+    """
+    if elapsed_s <= 0.0:
+        return np.zeros(len(tracks), np.bool_)
+    asked = tracks.moving & (tracks.unproven_s >= _UNPROVEN_S)
+    return _must_have_left(tracks, asked, sight, resolves_m, elapsed_s)
+
+
+@compiled(Tracks, "boolean[::1], float64[:, ::1], float64[::1], float64")
+def _must_have_left(
+    tracks: Tracks, asked: NDArray[np.bool_], sight: FloatArray, resolves_m: FloatArray, elapsed_s: float
+) -> NDArray[np.bool_]:
+    """(T,) of the tracks asked (T,), those that must have left their place of elapsed_s ago."""
+    gone = np.zeros(len(asked), np.bool_)
+    for t in range(len(asked)):
+        along_m, squared = 0.0, 0.0
+        for i in range(3):
+            displacement_m = elapsed_s * tracks.state[t, 3 + i]
+            along_m += displacement_m * sight[t, i]
+            squared += displacement_m * displacement_m
+        across_m = math.sqrt(max(squared - along_m * along_m, 0.0))
+        width_m, depth_m = max(tracks.extent_m[t, 0], tracks.extent_m[t, 2]), tracks.extent_m[t, 2]
+        far = across_m >= _LEFT_SHARE * width_m or abs(along_m) >= max(resolves_m[t], _LEFT_SHARE * depth_m)
+        gone[t] = asked[t] and far
+    return gone
 
 
 def drop_overdue_movers(

@@ -1,4 +1,4 @@
-"""Movers that went behind what stands, at about its depth, keep none of its cells."""
+"""Which movers cannot be where they are seen; behind what stands, at about its depth, they keep no cells."""
 
 from __future__ import annotations
 
@@ -8,9 +8,11 @@ import pytest
 from tests.support.ballots import MOVES, PART, vote
 from tests.support.grids import block, labelled
 from vision.bodies import votes
+from vision.bodies.tracks import Tracks
 
 HALF = block((10, 30), (10, 30))  # of PART; the other half is a crate's, which stands
 OVERDUE = np.array([False, True])
+AHEAD = np.array([0.0, 0.0, 1.0])
 
 
 @pytest.mark.parametrize(("stayed_columns", "hidden"), [(14, True), (13, False)])
@@ -63,3 +65,39 @@ def test_a_mover_ends_where_a_guess_has_it_if_what_stands_claims_all_of_its_part
     # Who claims nothing ends nowhere.
     alone = vote(PART > 0, np.zeros_like(HALF), mover=(False, True))
     np.testing.assert_array_equal(votes.border_is_guess(alone, MOVES), [False, False])
+
+
+def movers(count: int) -> Tracks:
+    """Half a metre wide and 1.8 m tall, at 0.5 m/s across the view, with no proof of it for 0.05 s."""
+    tracks = Tracks()
+    tracks.start(np.zeros((count, 3)), 0.1, 1.5, 1.0, 0)
+    tracks.state[:, 3] = 0.5
+    tracks.moving[:] = True
+    tracks.extent_m[:] = 0.49, 1.8, 0.1
+    tracks.unproven_s[:] = 0.05
+    return tracks
+
+
+def test_overdue_is_a_mover_unproven_that_has_gone_most_of_its_width_since() -> None:
+    """0.6 s at 0.5 m/s are 0.3 m: six tenths of 0.5 m, however tall it is."""
+    tracks = movers(6)
+    tracks.state[1, 3] = 0.45
+    tracks.extent_m[2, 0] = tracks.extent_m[3, 2] = 0.51
+    tracks.unproven_s[4] = 0.04
+    tracks.moving[5] = False
+    sight, resolves_m = np.tile(AHEAD, (6, 1)), np.full(6, 0.4)
+    np.testing.assert_array_equal(
+        votes.overdue_movers(tracks, 0.6, sight, resolves_m), [True, False, False, False, False, False]
+    )
+    assert not votes.overdue_movers(tracks, 0.5, sight, resolves_m).any()
+    assert not votes.overdue_movers(tracks, 0.0, sight, resolves_m).any()  # nothing was seen then
+
+
+def test_mover_along_the_line_of_sight_is_overdue_once_depth_resolves_it() -> None:
+    tracks = movers(3)
+    tracks.state[:, 3:] = [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0], [0.0, 0.0, 1.0]]
+    tracks.extent_m[2, 2] = 1.1
+    resolves_m = np.array([0.59, 0.61, 0.59])
+    np.testing.assert_array_equal(
+        votes.overdue_movers(tracks, 0.6, np.tile(AHEAD, (3, 1)), resolves_m), [True, False, False]
+    )
