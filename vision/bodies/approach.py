@@ -51,7 +51,7 @@ _RANGE_SIGMAS = 2.0
 _CLEAR_SIGMAS = 3.0
 
 
-class Approach(NamedTuple):
+class ApproachSpeeds(NamedTuple):
     """Speeds of T tracks towards the camera, 0 or more, by the depth of their surfaces; m/s.
 
     mps: (T,); 0 where it is not measured.
@@ -72,12 +72,12 @@ class Approach(NamedTuple):
 
 def measure(
     tracks: Tracks, detection: Detection, labels: IntGrid, memory: ViewMemory, noise: DepthNoise
-) -> Approach:
+) -> ApproachSpeeds:
     """Measure the tracks with the cells labels (h, w), track index + 1.
 
     Only those that clearly come nearer count as measured.
     """
-    nothing = Approach(np.zeros(len(tracks)), np.full(len(tracks), np.inf), 0.0)
+    nothing = ApproachSpeeds(np.zeros(len(tracks)), np.full(len(tracks), np.inf), 0.0)
     before, lately = (memory.view_of(detection.captured_ns, wanted_s) for wanted_s in _LOOK_BACK_S)
     asked = (tracks.extent_m.max(axis=1) <= LARGEST_M) & (tracks.cells >= EVEN_CELLS)
     cells = np.where(asked, tracks.cells, 0)
@@ -90,14 +90,14 @@ def measure(
     shorter = _since(lately, detection, labels, np.where(clear, cells, 0), noise)
     jumped = shorter.mps > _STEADY * longer.mps + shorter.sigma_mps
     counts = clear & np.isfinite(shorter.sigma_mps) & ~jumped
-    return Approach(
+    return ApproachSpeeds(
         np.where(counts, longer.mps, 0.0), np.where(counts, longer.sigma_mps, np.inf), longer.lag_s
     )
 
 
 def _since(
     then: EarlierView, detection: Detection, labels: IntGrid, cells: NDArray[np.intp], noise: DepthNoise
-) -> Approach:
+) -> ApproachSpeeds:
     """Measure by comparing with one view; mps is negative for what moves away.
 
     cells: number of cells of each track, 0 for tracks that are not asked for, (T,).
@@ -106,7 +106,7 @@ def _since(
     mps, sigma_mps = _compared(
         detection.grid, labels, cells, detection.pose, then.pose, then.inverse, noise, lag_s
     )
-    return Approach(mps, sigma_mps, lag_s)
+    return ApproachSpeeds(mps, sigma_mps, lag_s)
 
 
 @inlined
@@ -147,7 +147,7 @@ def _compared(
     noise: DepthNoise,
     lag_s: float,
 ) -> tuple[FloatArray, FloatArray]:
-    """(T,) mps and sigma_mps of Approach, mps negative for what moves away.
+    """(T,) mps and sigma_mps of ApproachSpeeds, mps negative for what moves away.
 
     cells (T,): as _since. seen (h, w): 1/m, from old_pose, lag_s ago; 0 where not measured.
     """
@@ -184,7 +184,7 @@ def _compared(
     return mps, sigma_mps
 
 
-def fuse(tracks: Tracks, approach: Approach, camera_m: FloatArray, dt_s: float) -> None:
+def fuse(tracks: Tracks, approach: ApproachSpeeds, camera_m: FloatArray, dt_s: float) -> None:
     """Update both filters of the tracks with their speeds towards a camera at camera_m (3,).
 
     Not of those that are known to move: while they cross, what is behind them was seen in their place. dt_s:
@@ -201,6 +201,6 @@ def fuse(tracks: Tracks, approach: Approach, camera_m: FloatArray, dt_s: float) 
     tracks.update_with_surface(use, velocity, kalman.along_only(direction, variance))
 
 
-def approaching_s(so_far_s: FloatArray, approach: Approach, dt_s: float) -> FloatArray:
+def approaching_s(so_far_s: FloatArray, approach: ApproachSpeeds, dt_s: float) -> FloatArray:
     """(T,) for how long surfaces have clearly come nearer without a break, after a further frame of dt_s."""
     return np.where(approach.mps > 0.0, so_far_s + dt_s, 0.0)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from config.perception import DepthNoise
 from hal.compiled import compiled
 from hal.types import Flags, FloatArray, Integers, Matrices, Matrix, Vector
-from vision.bodies.approach import Approach
+from vision.bodies.approach import ApproachSpeeds
 from vision.bodies.rim_motion import RimVelocities
 from vision.bodies.tracks import Tracks
 from vision.depth.depth_noise import depth_sigma_m
@@ -37,7 +37,7 @@ class FrameMeasures:
 
     fragments: BodyVelocities
     rims: RimVelocities
-    approach: Approach
+    approach: ApproachSpeeds
     arrived: Integers
     cells: Integers
 

@@ -14,7 +14,7 @@ from tests.support.detections import AT_ORIGIN, FRAME_NS, detection, track
 from tests.support.grids import grid_of, labelled, nearest, no_depth, plate, wall
 from tests.support.judging import ALONG, one, rises
 from vision.bodies import approach
-from vision.bodies.approach import Approach
+from vision.bodies.approach import ApproachSpeeds
 from vision.bodies.arrivals import ViewMemory
 from vision.bodies.tracks import Tracks
 
@@ -41,7 +41,7 @@ def measured(
     count: int = COUNT,
     noise_m: float = 0.0,
     size_m: float = 2.0,
-) -> Approach:
+) -> ApproachSpeeds:
     """Of the body, after count frames of it and of others. All are depths at a time in seconds."""
     memory, rng = ViewMemory(NOISE), np.random.default_rng(1)
     for k in range(count):
@@ -158,8 +158,8 @@ def test_the_filters_learn_the_speed_along_the_line_of_sight_only() -> None:
 
 
 def test_the_time_of_an_approach_ends_with_the_first_frame_that_does_not_show_it() -> None:
-    clear = Approach(np.array([0.6]), np.array([0.19]), 0.6)
-    nothing = Approach(np.zeros(1), np.full(1, np.inf), 0.6)
+    clear = ApproachSpeeds(np.array([0.6]), np.array([0.19]), 0.6)
+    nothing = ApproachSpeeds(np.zeros(1), np.full(1, np.inf), 0.6)
     shown_s = np.zeros(1)
     for _ in range(3):
         shown_s = approach.approaching_s(shown_s, clear, FRAME_S)
