@@ -8,7 +8,7 @@ the level component across is given separately. vision/bodies/proof.py uses the 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,8 +24,7 @@ _AXES = 3
 _NOWHERE = np.zeros(3)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Split:
+class Split(NamedTuple):
     """K velocities of each of T bodies, split along and across the line of sight.
 
     speed, sigma: of the whole velocity: its length, and the root of the sum of its variances, (K, T).
@@ -54,25 +53,8 @@ def decompose(
 
     sight (T, 3): unit vectors along the lines of sight. up (3,): the floor's normal, None if not known.
     """
-    speed, sigma, value, variance, rest, along, across, total, level = _parts(
-        np.ascontiguousarray(velocity).reshape(-1, _AXES),
-        np.ascontiguousarray(covariance).reshape(-1, _AXES, _AXES),
-        np.ascontiguousarray(sight),
-        _NOWHERE if up is None else np.ascontiguousarray(up),
-    )
-    shape = velocity.shape[:-1]
-    across = across.reshape(shape)
-    return Split(
-        speed=speed.reshape(shape),
-        sigma=sigma.reshape(shape),
-        value=value.reshape(shape),
-        variance=variance.reshape(shape),
-        rest=rest.reshape(velocity.shape),
-        along=along.reshape(shape),
-        across=across,
-        total=total.reshape(shape),
-        level=across if up is None else level.reshape(shape),
-    )
+    split = _split(velocity, covariance, sight, _NOWHERE if up is None else up)
+    return split._replace(level=split.across) if up is None else split
 
 
 @inlined
@@ -131,53 +113,47 @@ def _put_level_direction(sight: FloatArray, up: FloatArray, level_direction: Flo
         level_direction[i] /= max(length, _MIN_LEVEL)
 
 
-@compiled("float64[:, ::1], float64[:, :, ::1], float64[:, ::1], float64[::1]")
-def _parts(
-    velocity: FloatArray, covariance: FloatArray, sight: FloatArray, up: FloatArray
-) -> tuple[
-    FloatArray,
-    FloatArray,
-    FloatArray,
-    FloatArray,
-    FloatArray,
-    FloatArray,
-    FloatArray,
-    FloatArray,
-    FloatArray,
-]:
-    """The fields of Split, of velocities (K, 3).
-
-    K is a multiple of T: one velocity of each of T bodies, then another one of each, and so on.
-    """
-    count = len(velocity)
-    speed, sigma = np.empty(count), np.empty(count)
-    value, variance, rest = np.empty(count), np.empty(count), np.empty((count, _AXES))
-    along, across, total, level = np.empty(count), np.empty(count), np.empty(count), np.empty(count)
+@compiled("float64[:, :, ::1], float64[:, :, :, ::1], float64[:, ::1], float64[::1]")
+def _split(velocity: FloatArray, covariance: FloatArray, sight: FloatArray, up: FloatArray) -> Split:
+    """As decompose, with the floor's normal up (3,)."""
+    shape = velocity.shape[:2]
+    split = Split(
+        speed=np.empty(shape),
+        sigma=np.empty(shape),
+        value=np.empty(shape),
+        variance=np.empty(shape),
+        rest=np.empty(velocity.shape),
+        along=np.empty(shape),
+        across=np.empty(shape),
+        total=np.empty(shape),
+        level=np.empty(shape),
+    )
     regularised, level_direction = np.empty((_AXES, _AXES)), np.empty(_AXES)
-    for k in range(count):
-        own, spread, towards = velocity[k], covariance[k], sight[k % len(sight)]
-        speed[k] = math.sqrt(own[0] * own[0] + own[1] * own[1] + own[2] * own[2])
-        sigma[k] = math.sqrt(spread[0, 0] + spread[1, 1] + spread[2, 2])
-        value[k], variance[k] = _component(own, spread, towards)
-        along[k] = value[k] * value[k] / (variance[k] + _FLOOR)
-        for i in range(_AXES):
-            rest[k, i] = own[i] - value[k] * towards[i]
-        _put_across(spread, variance[k], towards, regularised)
-        for i in range(_AXES):
-            regularised[i, i] += _FLOOR
-        across[k] = _squared_sigmas(rest[k], regularised)
-        regularised[:] = spread
-        for i in range(_AXES):
-            regularised[i, i] += _FLOOR
-        total[k] = _squared_sigmas(own, regularised)
-        _put_level_direction(towards, up, level_direction)
-        sideways, sideways_variance = _component(own, spread, level_direction)
-        level[k] = sideways * sideways / (sideways_variance + _FLOOR)
-    return speed, sigma, value, variance, rest, along, across, total, level
+    for k in range(shape[0]):
+        for t in range(shape[1]):
+            own, spread, towards = velocity[k, t], covariance[k, t], sight[t]
+            split.speed[k, t] = math.sqrt(own[0] * own[0] + own[1] * own[1] + own[2] * own[2])
+            split.sigma[k, t] = math.sqrt(spread[0, 0] + spread[1, 1] + spread[2, 2])
+            value, variance = _component(own, spread, towards)
+            split.value[k, t], split.variance[k, t] = value, variance
+            split.along[k, t] = value * value / (variance + _FLOOR)
+            for i in range(_AXES):
+                split.rest[k, t, i] = own[i] - value * towards[i]
+            _put_across(spread, variance, towards, regularised)
+            for i in range(_AXES):
+                regularised[i, i] += _FLOOR
+            split.across[k, t] = _squared_sigmas(split.rest[k, t], regularised)
+            regularised[:] = spread
+            for i in range(_AXES):
+                regularised[i, i] += _FLOOR
+            split.total[k, t] = _squared_sigmas(own, regularised)
+            _put_level_direction(towards, up, level_direction)
+            sideways, sideways_variance = _component(own, spread, level_direction)
+            split.level[k, t] = sideways * sideways / (sideways_variance + _FLOOR)
+    return split
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class SecondOpinion:
+class SecondOpinion(NamedTuple):
     """Whether the surface's velocity denies or confirms the fragments', along and across: (T,) each."""
 
     denies_along: Flags

@@ -40,22 +40,6 @@ def long_static(motion: EndResiduals, age_s: FloatArray) -> NDArray[np.bool_]:
     return result
 
 
-def cluster(
-    position_m: FloatArray, velocity: FloatArray, covariance: FloatArray, depth_sigma_m: FloatArray
-) -> NDArray[np.intp]:
-    """(M,) group of each of M moving fragments, as the index of the group's first fragment.
-
-    Neighbours in space that move alike belong to one group. position_m (M, 3), velocity (M, 3), covariance
-    (M, 3, 3): in the camera's axes. depth_sigma_m (M,): depth noise at their distance.
-    """
-    return _clusters(
-        np.ascontiguousarray(position_m),
-        np.ascontiguousarray(velocity),
-        np.ascontiguousarray(covariance),
-        np.ascontiguousarray(depth_sigma_m),
-    )
-
-
 @inlined
 def _alike(
     one: int,
@@ -80,10 +64,15 @@ def _alike(
 
 
 @compiled("float64[:, ::1], float64[:, ::1], float64[:, :, ::1], float64[::1]")
-def _clusters(
+def cluster(
     position_m: FloatArray, velocity: FloatArray, covariance: FloatArray, sigma_m: FloatArray
 ) -> NDArray[np.intp]:
-    """As cluster: a group spreads from a fragment without one along the chains of its neighbours."""
+    """(M,) group of each of M moving fragments, as the index of the group's first fragment.
+
+    Neighbours in space that move alike belong to one group: it spreads from a fragment without one along the
+    chains of its neighbours. position_m (M, 3), velocity (M, 3), covariance (M, 3, 3): in the camera's axes.
+    sigma_m (M,): depth noise at their distance.
+    """
     count = len(position_m)
     group, reached = np.full(count, -1), np.empty(count, np.intp)
     for first in range(count):
