@@ -184,17 +184,15 @@ def _checked(points: _Points, fitted: _Fitted, start: Pose, prior: MotionPrior) 
             conflicts = _conflict(found, prior.sigma)
         bend = _bend(found)
     ratio = found.inliers / count
-    # Without an inverse OpenCV returns zeros, which would mean perfect knowledge: check regular below.
-    regular, covariance = cv2.invert(found.information, flags=cv2.DECOMP_CHOLESKY)
-    if found.inliers < least or (conflicts and not disputed) or not regular:
+    covariance = _inverse(found.information)
+    if found.inliers < least or (conflicts and not disputed) or covariance is None:
         return _prior_only(start, sigma, ratio)
-    spread = np.asarray(covariance, np.float64)
     return CameraEstimate(
         pose=found.pose,
         sweep_rad=found.sweep_rad,
         bend_rad=bend[0],
         bend_variance=bend[1],
-        covariance=spread,
+        covariance=covariance,
         inlier_ratio=ratio,
         visual=not disputed,
         disputed=disputed,
@@ -212,8 +210,8 @@ def _implausible(found: Fit, prior: MotionPrior) -> bool:
     """Whether the camera turns in another way than slip explains, or contradicts its prior as a whole."""
     beyond_rad = abs(found.back[1]) - prior.slip_rad
     if beyond_rad > 0.0:
-        regular, covariance = cv2.invert(found.information, flags=cv2.DECOMP_CHOLESKY)
-        if regular and beyond_rad**2 > _CERTAIN_CHI2 * covariance[1, 1]:
+        covariance = _inverse(found.information)
+        if covariance is not None and beyond_rad**2 > _CERTAIN_CHI2 * covariance[1, 1]:
             return True
     return _conflict(found, prior.sigma)
 
@@ -253,11 +251,20 @@ def _prior_only(start: Pose, sigma: FloatArray, inlier_ratio: float) -> CameraEs
 
 def _bend(found: Fit) -> tuple[FloatArray, FloatArray]:
     """The sweep and its variance, (2,) each, without its prior: one more Gauss-Newton step."""
-    regular, covariance = cv2.invert(found.free, flags=cv2.DECOMP_CHOLESKY)
-    if not regular:
+    covariance = _inverse(found.free)
+    if covariance is None:
         return np.zeros(2), np.full(2, np.inf)
-    spread = np.asarray(covariance, np.float64)[6:]
+    spread = covariance[6:]
     return found.free_from_rad + spread @ found.free_side, spread[:, 6:].diagonal()
+
+
+def _inverse(information: FloatArray) -> FloatArray | None:
+    """The covariance (8, 8) that information gives; None if it is singular.
+
+    OpenCV returns zeros then, which would mean perfect knowledge.
+    """
+    regular, covariance = cv2.invert(information, flags=cv2.DECOMP_CHOLESKY)
+    return np.asarray(covariance, np.float64) if regular else None
 
 
 def _conflict(found: Fit, sigma: FloatArray) -> bool:

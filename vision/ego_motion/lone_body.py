@@ -37,7 +37,7 @@ def without_lone_body(view: View, start: Pose, obstacles: tuple[Obstacle, ...], 
         return view
     focal, centre = np.array([camera.fx, camera.fy] * 2), np.array([camera.cx, camera.cy] * 2)
     boxes = (boxes_px + _MARGIN_PX * np.array([-1.0, -1.0, 1.0, 1.0]) - centre) / focal
-    others = _others(view.lines, view.seen, view.whitening, as_array(start), boxes)
+    others = _others(view, as_array(start), boxes)
     if len(others) == len(view.seen):
         return view
     return View(view.lines[others], view.seen[others], view.whitening[others])
@@ -71,14 +71,13 @@ def _inside(box: FloatArray, seen: FloatArray) -> bool:
     return result
 
 
-@compiled("float64[:, :, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1]")
-def _others(
-    lines: FloatArray, seen: FloatArray, whitening: FloatArray, pose: FloatArray, boxes: FloatArray
-) -> NDArray[np.intp]:
+@compiled(View, "float64[:, ::1], float64[:, ::1]")
+def _others(view: View, pose: FloatArray, boxes: FloatArray) -> NDArray[np.intp]:
     """The points outside the lone body's box, or all points if there is none. boxes (B, 4): as seen."""
-    count, by_body, by_all = len(seen), np.zeros(len(boxes)), 0.0
+    seen, by_body, by_all = view.seen, np.zeros(len(boxes)), 0.0
+    count = len(seen)
     for k in range(count):
-        told = _told(lines[k], seen[k], whitening[k], pose)
+        told = _told(view.lines[k], seen[k], view.whitening[k], pose)
         by_all += told
         for b in range(len(boxes)):
             if _inside(boxes[b], seen[k]):

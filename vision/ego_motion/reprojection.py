@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,8 @@ from numpy.typing import NDArray
 from hal.compiled import compiled
 from hal.types import Flags, FloatArray, Intrinsics, Matrix, Vector
 from vision.camera.lens import ray_through, row_delays
+
+_Rows = Annotated[FloatArray, "float64[:, ::1]"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,9 +46,9 @@ class View:
         variance; then the variance of its depth, (N, 4).
     """
 
-    lines: FloatArray
-    seen: FloatArray
-    whitening: FloatArray
+    lines: Annotated[FloatArray, "float64[:, :, ::1]"]
+    seen: _Rows
+    whitening: _Rows
 
     def with_pixel_variance(self, scale: float) -> View:
         """The same points, with scale times the variance of where they are seen."""

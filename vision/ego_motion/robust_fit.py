@@ -57,7 +57,7 @@ class Fit:
 def fit(view: View, start: Pose, sigma: FloatArray) -> Fit:
     """Iteratively reweighted Gauss-Newton from start. sigma (8,): prior of the motion and the sweep."""
     pose, sweep_rad, back, information, inliers, free, free_side, free_from_rad = _fitted(
-        view.lines, view.seen, view.whitening, as_array(start), np.ascontiguousarray(sigma)
+        view, as_array(start), np.ascontiguousarray(sigma)
     )
     return Fit(
         pose=Pose(pose[:, :3].copy(), pose[:, 3].copy()),
@@ -73,15 +73,16 @@ def fit(view: View, start: Pose, sigma: FloatArray) -> Fit:
 
 def misfits(view: View, found: Fit) -> FloatArray:
     """(N,) chi-square of each point at the pose and sweep of a fit; inf if it is behind the camera."""
-    return _misfits(view.lines, view.seen, view.whitening, as_array(found.pose), found.sweep_rad)
+    return _misfits(view, as_array(found.pose), found.sweep_rad)
 
 
 @inlined
-def _shifted(lines: FloatArray, seen: FloatArray, start: FloatArray, sigma: FloatArray) -> FloatArray:
+def _shifted(view: View, start: FloatArray, sigma: FloatArray) -> FloatArray:
     """A better start pose: start rotated by the median residual of all points, by 3 sigma (8,) at most."""
-    across, down, turn = np.empty(len(seen)), np.empty(len(seen)), np.zeros(6)
-    for k in range(len(seen)):
-        x, y, z = in_camera(start, lines[k, 0])
+    count, seen = len(view.seen), view.seen
+    across, down, turn = np.empty(count), np.empty(count), np.zeros(6)
+    for k in range(count):
+        x, y, z = in_camera(start, view.lines[k, 0])
         ahead = max(z, MIN_AHEAD_M)
         across[k], down[k] = seen[k, 0] - x / ahead, seen[k, 1] - y / ahead
     turn[0] = min(max(np.median(down), -3.0 * sigma[0]), 3.0 * sigma[0])
@@ -91,7 +92,7 @@ def _shifted(lines: FloatArray, seen: FloatArray, start: FloatArray, sigma: Floa
 
 @inlined
 def _linearised(
-    lines: FloatArray, seen: FloatArray, whitening: FloatArray, pose: FloatArray, sweep_rad: FloatArray
+    view: View, pose: FloatArray, sweep_rad: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.bool_]]:
     """Linearise the residuals at a pose and sweep.
 
@@ -101,6 +102,7 @@ def _linearised(
         by_depth (Sherman-Morrison).
     in_front (N,): in front of the camera.
     """
+    lines, seen, whitening = view.lines, view.seen, view.whitening
     count = len(seen)
     table, by_depth = np.empty((count, 2, _UNKNOWNS + 1)), np.empty((count, 2))
     depth_downweight, in_front = np.empty(count), np.empty(count, np.bool_)
@@ -204,22 +206,23 @@ def _reduce_residuals(table: FloatArray, step: FloatArray) -> None:
             table[k, 1, _RESIDUAL] -= step[i] * table[k, 1, i]
 
 
-@compiled("float64[:, :, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1]")
+@compiled(View, "float64[:, ::1], float64[::1]")
 def _fitted(
-    lines: FloatArray, seen: FloatArray, whitening: FloatArray, start: FloatArray, sigma: FloatArray
+    view: View, start: FloatArray, sigma: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, int, FloatArray, FloatArray, FloatArray]:
     """The fields of Fit. Poses are (3, 4): rotation and translation."""
-    prior, pose, sweep_rad = 1.0 / np.square(sigma), _shifted(lines, seen, start, sigma), np.zeros(2)
-    table, by_depth, depth_downweight, in_front = _linearised(lines, seen, whitening, pose, sweep_rad)
+    prior, pose, sweep_rad = 1.0 / np.square(sigma), _shifted(view, start, sigma), np.zeros(2)
+    table, by_depth, depth_downweight, in_front = _linearised(view, pose, sweep_rad)
     # to_prior: from the present estimate to the prior mean. since_linearised: the sum of steps since the
     # linearisation.
     to_prior, since_linearised = np.zeros(_UNKNOWNS), np.zeros(_UNKNOWNS)
     to_prior[:_SWEEP] = back_to(pose, start)
-    chi2, allowed = np.empty(len(seen)), np.zeros(len(seen), np.bool_)
+    count = len(view.seen)
+    chi2, allowed = np.empty(count), np.zeros(count, np.bool_)
     for iteration in range(_ITERATIONS):
         scale = _ANNEAL[iteration] if iteration < len(_ANNEAL) else 1.0
         normal = np.zeros((_UNKNOWNS, _UNKNOWNS + 1))
-        for k in range(len(seen)):
+        for k in range(count):
             chi2[k] = _chi2(table[k], by_depth[k], depth_downweight[k])
             if iteration == 0:
                 gate = _GATE_CHI2 * (1.0 + _assumed_variance(table[k], sigma))
@@ -243,26 +246,24 @@ def _fitted(
         if np.abs(since_linearised).max() > _STRAIGHT:
             pose, sweep_rad = moved(pose, since_linearised), sweep_rad + since_linearised[_SWEEP:]
             since_linearised[:] = 0.0
-            table, by_depth, depth_downweight, in_front = _linearised(lines, seen, whitening, pose, sweep_rad)
+            table, by_depth, depth_downweight, in_front = _linearised(view, pose, sweep_rad)
             to_prior[:_SWEEP], to_prior[_SWEEP:] = back_to(pose, start), -sweep_rad
         else:
             to_prior -= step
             _reduce_residuals(table, step)
     pose, inliers = moved(pose, since_linearised), 0
-    for k in range(len(seen)):
+    for k in range(count):
         inliers += allowed[k] and chi2[k] <= _GATE_CHI2
     sweep_rad = sweep_rad + since_linearised[_SWEEP:]
     return pose, sweep_rad, back_to(pose, start), information, inliers, free, free_side, free_from_rad
 
 
-@compiled("float64[:, :, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1]")
-def _misfits(
-    lines: FloatArray, seen: FloatArray, whitening: FloatArray, pose: FloatArray, sweep_rad: FloatArray
-) -> FloatArray:
+@compiled(View, "float64[:, ::1], float64[::1]")
+def _misfits(view: View, pose: FloatArray, sweep_rad: FloatArray) -> FloatArray:
     """As misfits()."""
-    table, by_depth, depth_downweight, in_front = _linearised(lines, seen, whitening, pose, sweep_rad)
-    chi2 = np.full(len(seen), np.inf)
-    for k in range(len(seen)):
+    table, by_depth, depth_downweight, in_front = _linearised(view, pose, sweep_rad)
+    chi2 = np.full(len(view.seen), np.inf)
+    for k in range(len(chi2)):
         if in_front[k]:
             chi2[k] = _chi2(table[k], by_depth[k], depth_downweight[k])
     return chi2

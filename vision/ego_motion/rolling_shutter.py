@@ -69,15 +69,18 @@ class ReadOut:
     @property
     def seconds(self) -> float:
         """From the first row to the last: the estimate less one sigma, 0 for a global shutter."""
+        estimate_s, sigma_s = self._estimate()
+        return min(max(estimate_s - sigma_s, 0.0), _MAX_READ_OUT_S)
+
+    def _estimate(self) -> tuple[float, float]:
+        """The read-out time that was learned, and one sigma of it, in seconds."""
         information = self._information + 1.0 / _UNKNOWN_S**2
-        return min(max(self._weighted_sum / information - 1.0 / math.sqrt(information), 0.0), _MAX_READ_OUT_S)
+        return self._weighted_sum / information, 1.0 / math.sqrt(information)
 
     def sweep(self) -> SweepPrior:
         """The prior of how far the camera turns about x and y while the next image is read."""
-        information = self._information + 1.0 / _UNKNOWN_S**2
-        max_s = min(
-            max(self._weighted_sum / information, 0.0) + 1.0 / math.sqrt(information), _MAX_READ_OUT_S
-        )
+        estimate_s, sigma_s = self._estimate()
+        max_s = min(max(estimate_s, 0.0) + sigma_s, _MAX_READ_OUT_S)
         return SweepPrior(
             _MIN_SWEEP_RAD + self.seconds * self._rates_radps, _MIN_SWEEP_RAD + max_s * self._rates_radps
         )
