@@ -226,8 +226,7 @@ class Detector:
 
     def _add(self, new: NewFragments, body_only: bool = False) -> None:
         """Keep new fragments, unless they are on the robot itself."""
-        new = new.select(~self._depth.on_own(new.ends_px))
-        self._store.add(new.ends_px, new.near_m, new.far_m, new.pixel_cov, body_only=body_only)
+        self._store.add(new.select(~self._depth.on_own(new.ends_px)), body_only)
 
     def _commit(self, now: _Now, images: Pyramid, sweep_rad: FloatArray) -> None:
         """The next frame is compared with this one."""

@@ -70,19 +70,21 @@ class NeedsFragments:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Body:
-    """A body that is looked at.
+    """A body that is looked at in a frame.
 
-    grey: the part of the image around its box. corner_px: column and row of its upper left corner.
-    depth_m, gate_m: as in NeedsFragments.
+    frame, grey: the frame, and its colour image in grey. around: the part of grey around the body's box.
+    corner_px: column and row of the upper left corner of that part. depth_m, gate_m: as in NeedsFragments.
     """
 
+    frame: RgbdFrame
     grey: GreyImage
+    around: GreyImage
     corner_px: tuple[int, int]
     depth_m: float
     gate_m: float
 
 
-def _around(grey: GreyImage, bodies: NeedsFragments, one: int) -> _Body | None:
+def _body(frame: RgbdFrame, grey: GreyImage, bodies: NeedsFragments, one: int) -> _Body | None:
     """The body with this index; None if it is too small in the image."""
     height, width = grey.shape
     u0, v0, u1, v1 = bodies.box_px[one].astype(int).tolist()
@@ -90,7 +92,8 @@ def _around(grey: GreyImage, bodies: NeedsFragments, one: int) -> _Body | None:
     top, bottom = max(0, v0 - _MARGIN_PX), min(height, v1 + _MARGIN_PX)
     if min(right - left, bottom - top) < _MIN_SIDE_PX:
         return None
-    return _Body(grey[top:bottom, left:right], (left, top), bodies.depth_m[one], bodies.gate_m[one])
+    around = grey[top:bottom, left:right]
+    return _Body(frame, grey, around, (left, top), bodies.depth_m[one], bodies.gate_m[one])
 
 
 def _alone_on_it(near_m: FloatArray, far_m: FloatArray, holes: FloatArray, body: _Body) -> NDArray[np.bool_]:
@@ -121,63 +124,57 @@ class Attention:
         settings = self._config.fragments
         room = settings.max_fragments + settings.closer_fragments - len(ends_px)
         one = self._next(bodies, frame.captured_ns) if room > 0 else None
-        body = None if one is None else _around(grey, bodies, one)
+        body = None if one is None else _body(frame, grey, bodies, one)
         if body is None:
             return None
         wanted = min(room, _AT_ONCE)
-        new = self._by_edges(frame, grey, ends_px, body, wanted)
+        new = self._by_edges(body, ends_px, wanted)
         wanted -= len(new.ends_px)
-        if wanted == 0 or body.grey.size > _MAX_CORNER_AREA_PX:
+        if wanted == 0 or body.around.size > _MAX_CORNER_AREA_PX:
             return new
         present_px = np.concatenate((ends_px, new.ends_px))
-        return joined(new, self._by_corners(frame, grey, present_px, body, wanted))
+        return joined(new, self._by_corners(body, present_px, wanted))
 
-    def _by_edges(
-        self, frame: RgbdFrame, grey: GreyImage, ends_px: NDArray[np.float32], body: _Body, wanted: int
-    ) -> NewFragments:
+    def _by_edges(self, body: _Body, ends_px: NDArray[np.float32], wanted: int) -> NewFragments:
         """At most wanted fragments, of the segments on a body."""
         settings = self._config.fragments
-        edges = find_edges(body.grey, _CONTRAST)
+        edges = find_edges(body.around, _CONTRAST)
         segments_px = find_segments(edges, _MIN_LENGTH * settings.min_length_px, body.corner_px)
-        longest_px = longest_first(segments_px)[:_CANDIDATES]
-        return self._on_it(frame, grey, longest_px, SNAP_PX, ends_px, body, wanted)
+        return self._on_it(body, longest_first(segments_px)[:_CANDIDATES], SNAP_PX, ends_px, wanted)
 
-    def _by_corners(
-        self, frame: RgbdFrame, grey: GreyImage, ends_px: NDArray[np.float32], body: _Body, wanted: int
-    ) -> NewFragments:
+    def _by_corners(self, body: _Body, ends_px: NDArray[np.float32], wanted: int) -> NewFragments:
         """At most wanted fragments, of pairs of corners on a body."""
-        scale_m = frame.depth_scale_m
-        (left, top), (rows, columns) = body.corner_px, body.grey.shape
+        depth, scale_m = body.frame.depth, body.frame.depth_scale_m
+        (left, top), (rows, columns) = body.corner_px, body.around.shape
         points = corners_within(
-            body.grey,
-            frame.depth[top : top + rows, left : left + columns],
+            body.around,
+            depth[top : top + rows, left : left + columns],
             (body.depth_m - body.gate_m) / scale_m,
             (body.depth_m + body.gate_m) / scale_m,
         )
         points = points + np.array((left, top), np.float32)
-        surface = surface_depth(frame.depth, scale_m, points, self._config)
+        surface = surface_depth(depth, scale_m, points, self._config)
         usable = _alone_on_it(surface.near_m, surface.far_m, surface.holes, body)
         # Moved, they would end up on the outline: its corners are the stronger ones, and were left out.
-        return self._on_it(frame, grey, in_pairs(points[usable]), 0, ends_px, body, wanted)
+        return self._on_it(body, in_pairs(points[usable]), 0, ends_px, wanted)
 
     def _on_it(
         self,
-        frame: RgbdFrame,
-        grey: GreyImage,
+        body: _Body,
         segments_px: NDArray[np.float32],
         reach_px: int,
         ends_px: NDArray[np.float32],
-        body: _Body,
         wanted: int,
     ) -> NewFragments:
         """At most wanted fragments, of segments (N, 2, 2) that lie on a body and can be tracked.
 
-        reach_px: maximum distance by which an end is moved to a corner.
+        reach_px: maximum distance by which an end is moved to a corner. ends_px (K, 2, 2): of the present
+        fragments.
         """
         ends, tensor = trackable_segments(
-            grey, segments_px, ends_px, _MIN_END_DISTANCE_PX, _MIN_EIGENVALUE, reach_px
+            body.grey, segments_px, ends_px, _MIN_END_DISTANCE_PX, _MIN_EIGENVALUE, reach_px
         )
-        surface = depth_along(ends, frame, self._config)
+        surface = depth_along(ends, body.frame, self._config)
         at_ends = surface.near_m[:, ::4], surface.far_m[:, ::4], surface.holes[:, ::4]
         here = on_one_surface(surface.near_m, self._config) & _alone_on_it(*at_ends, body).all(axis=1)
         return new_fragments(here.nonzero()[0][:wanted], ends, tensor, surface, self._config.fragments)

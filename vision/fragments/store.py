@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from hal.compiled import compiled
 from hal.types import FloatArray, Integers, Intrinsics, Matrix, Pose, Vector
 from vision.ego_motion.rolling_shutter import straight_rays
+from vision.fragments.candidates import NewFragments
 
 HISTORY = 24  # frames: enough for the window of 0.25 s at 90 frames a second
 _FEWEST_PLACES = 64  # places in the history at first; it grows by doubling
@@ -98,27 +99,20 @@ class FragmentStore:
         self.body_only = self.body_only.take(kept)
         self._place = self._place.take(kept)
 
-    def add(
-        self,
-        ends_px: NDArray[np.float32],
-        near_m: NDArray[np.float32],
-        far_m: NDArray[np.float32],
-        pixel_cov: NDArray[np.float32],
-        body_only: bool = False,
-    ) -> None:
+    def add(self, new: NewFragments, body_only: bool = False) -> None:
         """Add new fragments, seen for the first time in the frame that is committed next."""
-        count = len(ends_px)
+        count = len(new.ends_px)
         if count == 0:
             return
         self.ids = np.concatenate((self.ids, np.arange(self._next_id, self._next_id + count)))
         self._next_id += count
-        self.ends_px = np.concatenate((self.ends_px, ends_px))
-        self.near_m = np.concatenate((self.near_m, near_m))
-        self.far_m = np.concatenate((self.far_m, far_m))
-        self.depth_m = np.concatenate((self.depth_m, near_m))
+        self.ends_px = np.concatenate((self.ends_px, new.ends_px))
+        self.near_m = np.concatenate((self.near_m, new.near_m))
+        self.far_m = np.concatenate((self.far_m, new.far_m))
+        self.depth_m = np.concatenate((self.depth_m, new.near_m))
         self.depth_samples = np.concatenate((self.depth_samples, np.ones((count, 2), np.float32)))
         self.age_frames = np.concatenate((self.age_frames, np.zeros(count, np.intp)))
-        self.pixel_cov = np.concatenate((self.pixel_cov, pixel_cov))
+        self.pixel_cov = np.concatenate((self.pixel_cov, new.pixel_cov))
         self.error_px = np.concatenate((self.error_px, np.full((count, 2), np.inf, np.float32)))
         self.body_only = np.concatenate((self.body_only, np.full(count, body_only)))
         self._place = np.concatenate((self._place, self._free_places(count)))

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from hal.types import FloatArray, Intrinsics, Pose
 from vision.camera.lens import rotation_from_vector
+from vision.fragments.candidates import NewFragments
 from vision.fragments.store import HISTORY, FragmentStore
 
 CAMERA = Intrinsics(640, 480, 500.0, 400.0, 320.0, 240.0)
@@ -24,7 +25,7 @@ def add(store: FragmentStore, count: int) -> None:
     ends = np.zeros((count, 2, 2), np.float32)
     ends[:, 0, 0], ends[:, 1, 0], ends[:, :, 1] = ids, ids + 0.5, 100.0
     depth = np.stack((1.0 + ids, 1.0 + ids), axis=1).astype(np.float32)
-    store.add(ends, depth, depth + 0.25, np.ones((count, 2, 3), np.float32))
+    store.add(NewFragments(ends, depth, depth + 0.25, np.ones((count, 2, 3), np.float32)))
 
 
 def commit(store: FragmentStore, frame: int) -> None:
@@ -111,7 +112,7 @@ def test_a_body_only_fragment_stays_body_only() -> None:
     store = FragmentStore()
     add(store, 3)
     ends, depth = np.zeros((2, 2, 2), np.float32), np.ones((2, 2), np.float32)
-    store.add(ends, depth, depth, np.ones((2, 2, 3), np.float32), body_only=True)
+    store.add(NewFragments(ends, depth, depth, np.ones((2, 2, 3), np.float32)), body_only=True)
     store.keep(np.array([False, True, True, False, True]))
     assert store.body_only.tolist() == [False, False, True]
     store.clear()

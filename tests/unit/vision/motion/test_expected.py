@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hal.types import FloatArray, Intrinsics, Pose
+from vision.fragments.candidates import NewFragments
 from vision.fragments.store import FragmentStore
 from vision.motion.expected import expected_px, known_motion
 from vision.scene import Fragments
@@ -19,7 +20,7 @@ def one_fragment(near_m: tuple[float, float] = (4.0, 2.0)) -> FragmentStore:
     store = FragmentStore()
     ends_px = np.array([[[320.0, 240.0], [380.0, 190.0]]], np.float32)
     depth = np.array([near_m], np.float32)
-    store.add(ends_px, depth, depth, np.ones((1, 2, 3), np.float32))
+    store.add(NewFragments(ends_px, depth, depth, np.ones((1, 2, 3), np.float32)))
     return store
 
 

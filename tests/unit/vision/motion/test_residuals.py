@@ -11,6 +11,7 @@ from config.perception import DepthNoise
 from hal.types import FloatArray, Intrinsics, Pose
 from tests.support.point_motion import project
 from vision.ego_motion.camera_motion import CameraEstimate
+from vision.fragments.candidates import NewFragments
 from vision.fragments.store import FragmentStore
 from vision.motion import residuals as module
 from vision.motion.anchor_depths import average_depth, depths_with_sigma, static_points
@@ -46,7 +47,7 @@ def follow(ends_m: list[FloatArray], far_m: float | None = None, scale: float = 
         far = near if far_m is None else np.full((1, 2), far_m, np.float32)
         if k == 0:
             covariance = np.tile(np.array([0.02, 0.0, 0.02], np.float32), (1, 2, 1))
-            store.add(pixels, near, far, covariance)
+            store.add(NewFragments(pixels, near, far, covariance))
         else:
             store.ends_px, store.near_m, store.far_m = pixels, near, far
             anchor = store.anchors(stamp_ns, WINDOW_S)
@@ -120,7 +121,7 @@ def test_missing_depth_is_a_distant_point_hardly_known_and_not_used() -> None:
     store = FragmentStore()
     pixels = project(ENDS_M, CAMERA).astype(np.float32)[None]
     nothing = np.full((1, 2), np.nan, np.float32)
-    store.add(pixels, nothing, nothing, np.ones((1, 2, 3), np.float32))
+    store.add(NewFragments(pixels, nothing, nothing, np.ones((1, 2, 3), np.float32)))
     store.commit(FRAME_NS, STILL, CAMERA, np.zeros(2))
     anchor = store.anchors(2 * FRAME_NS, WINDOW_S)
     depths = depths_with_sigma(anchor, NOISE)
@@ -137,7 +138,7 @@ def test_an_end_before_a_distant_surface_measures_the_cameras_turn_on_either_sur
     store = FragmentStore()
     pixels = project(ENDS_M, CAMERA).astype(np.float32)[None]
     near, far = np.full((1, 2), 5.0, np.float32), np.array([[14.0, 9.9]], np.float32)
-    store.add(pixels, near, far, np.ones((1, 2, 3), np.float32))
+    store.add(NewFragments(pixels, near, far, np.ones((1, 2, 3), np.float32)))
     store.commit(FRAME_NS, STILL, CAMERA, np.zeros(2))
     anchor = store.anchors(2 * FRAME_NS, WINDOW_S)
     points = static_points(anchor, depths_with_sigma(anchor, NOISE), store.pixel_cov, np.array([False]), 10.0)

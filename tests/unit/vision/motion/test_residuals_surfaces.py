@@ -11,6 +11,7 @@ from config.perception import DepthNoise
 from hal.types import FloatArray, Intrinsics, Pose
 from vision.depth.depth_mask import UNSEEN_M
 from vision.ego_motion.camera_motion import CameraEstimate
+from vision.fragments.candidates import NewFragments
 from vision.fragments.store import FragmentStore
 from vision.motion.anchor_depths import depths_with_sigma
 from vision.motion.residuals import residuals
@@ -42,7 +43,9 @@ def seen(
         pixels = (first_px + np.array(step_px) * k).astype(np.float32)[None]
         near, far = np.full((1, 2), NEAR_M, np.float32), np.full((1, 2), far_m, np.float32)
         if k == 0:
-            store.add(pixels, near, far, np.tile(np.array([0.02, 0.0, 0.02], np.float32), (1, 2, 1)))
+            store.add(
+                NewFragments(pixels, near, far, np.tile(np.array([0.02, 0.0, 0.02], np.float32), (1, 2, 1)))
+            )
         else:
             store.ends_px, store.near_m, store.far_m = pixels, near, far
             anchor = store.anchors(stamp_ns, 0.25)
