@@ -15,6 +15,7 @@ handles at a time; the gradient is 0 in what does not belong to the window. Offs
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +40,19 @@ _EIGHTHS, _EIGHTHS_BITS = 8.0, 3  # grey levels of the first window are in eight
 # of 41 x 41 products of that with grey levels fits 32 bits.
 _SCHARR = 32.0
 _NEXT = np.uintp(1)
+
+
+class _Sought(NamedTuple):
+    """The window that is looked for.
+
+    gx, gy: its gradient. aim: the sums of its gradient times its grey levels. inverse: of its structure
+    tensor, xx, xy, yy.
+    """
+
+    gx: Values
+    gy: Values
+    aim: tuple[float, float]
+    inverse: tuple[float, float, float]
 
 
 @inlined
@@ -191,17 +205,14 @@ def _follow(
     v: float,
     side: int,
     stride: int,
-    gx: Values,
-    gy: Values,
-    aim: tuple[float, float],
-    inverse: tuple[float, float, float],
+    sought: _Sought,
     patch: Values,
 ) -> tuple[bool, float, float]:
     """Move a window in image, from its upper left corner u, v, until it matches. False: it left the image.
 
-    gx, gy: of the window looked for. aim: the sums of its gradient times its grey levels. inverse: of its
-    structure tensor, xx, xy, yy. patch: work space.
+    patch: work space.
     """
+    gx, gy, aim, inverse = sought
     down, window, left, top = np.uintp(stride), np.uintp(len(gx)), 0, 0
     last_u, last_v = math.inf, math.inf
     for iteration in range(ITERATIONS):
@@ -270,9 +281,8 @@ def search(
         if not usable:
             continue
         aim = _sum(gx, grey, first, window) / _EIGHTHS, _sum(gy, grey, first, window) / _EIGHTHS
-        found[n], u, v = _follow(
-            now, guess[n, 0] - half, guess[n, 1] - half, side, stride, gx, gy, aim, (xx, xy, yy), patch
-        )
+        sought = _Sought(gx, gy, aim, (xx, xy, yy))
+        found[n], u, v = _follow(now, guess[n, 0] - half, guess[n, 1] - half, side, stride, sought, patch)
         if found[n]:
             there[n, 0], there[n, 1] = u + half, v + half
     return there, found
