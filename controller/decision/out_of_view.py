@@ -44,12 +44,7 @@ from controller.decision.unseen_motion import (
     unseen_or_approaching,
     with_measured_velocity,
 )
-from controller.decision.unseen_position import (
-    EDGE_TOLERANCE_M,
-    EDGE_TOLERANCE_MPS,
-    extrapolated,
-    pushed_out_of_view,
-)
+from controller.decision.unseen_position import extrapolated, pushed_out_of_view
 from controller.decision.velocity_filter import missing_to_walking
 from controller.decision.view_edges import ViewEdges, out_of_view
 from hal.clocks import NS_PER_S
@@ -103,7 +98,7 @@ class OutOfView:
         self._approached = self._lately_approached(seen, out, comes)
         ids = seen.ids.tolist()
         came = np.array([one in self._approached for one in ids], np.bool_)
-        leaves = out & came & self._outside_view(seen, pose, edges)
+        leaves = out & came & out_of_view(seen, pose, self._mount, edges)
         if not np.count_nonzero(leaves):
             return seen
         velocity = seen.velocity_mps.copy()
@@ -135,7 +130,8 @@ class OutOfView:
         some_move = np.count_nonzero(bodies.moving) > 0
         xy_m = extrapolated(bodies, dt_s, pose, self._mount) if some_move else bodies.xy_m
         bodies = bodies.moved_to(seen.captured_ns, xy_m, bodies.unseen_s + dt_s)
-        out = self._outside_view(bodies, pose, edges) | unproven(bodies, pose, self._mount, edges, free)
+        out = out_of_view(bodies, pose, self._mount, edges)
+        out |= unproven(bodies, pose, self._mount, edges, free)
         kept = self._still_there(bodies, since_s, seen, out, pose)
         if standing:
             kept &= ~self._seen_through.seen_empty(bodies, pose, edges, free)
@@ -191,13 +187,6 @@ class OutOfView:
             return kept
         kept &= ~first_strips(bodies, since_s, seen)
         return kept & ~leftover_strips(bodies, kept)
-
-    def _outside_view(self, bodies: Bodies, pose: PlanarPose, edges: ViewEdges) -> BoolArray:
-        """(N,) which are beside, below or above the view, and not far behind the camera (out_of_view).
-
-        The side edge has a tolerance for the uncertainty of the position, which grows for movers.
-        """
-        return out_of_view(bodies, pose, self._mount, edges, EDGE_TOLERANCE_M, EDGE_TOLERANCE_MPS)
 
 
 @compiled("int64[:], int64[:]")

@@ -16,13 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.decision.bodies import Bodies
-from controller.decision.view_edges import (
-    ViewEdges,
-    ahead_and_left,
-    all_ahead_and_left,
-    beyond_edges,
-)
-from hal.compiled import compiled
+from controller.decision.view_edges import ViewEdges, ahead_and_left, is_beyond_edges
+from hal.compiled import compiled, inlined
 from hal.geometry import wrap_angle_rad
 from hal.types import CameraMount, PlanarPose
 from vision.scene import FreeSpace
@@ -63,21 +58,59 @@ class SeenThrough:
         if not abs(wrap_angle_rad(pose.heading_rad - self._heading_rad)) <= _STANDS_RAD:
             self.forget()
             self._heading_rad = pose.heading_rad
-        now_ns = bodies.captured_ns
-        ahead, left = all_ahead_and_left(bodies.xy_m, pose, self._mount)
-        near, far = ahead - bodies.half_view_m, ahead + bodies.half_view_m
-        in_view = ~bodies.moving & (near > 0.0)
-        in_view &= ~beyond_edges(bodies, near, self._mount.height_m, edges)
-        in_view &= np.abs(left) + bodies.half_across_m <= edges.edge_tan * near - _WELL_INSIDE_M
-        ids, since_ns = bodies.ids.tolist(), {}
-        for k in in_view.nonzero()[0].tolist():
-            bands = _bands(free, -left[k], float(bodies.half_across_m[k]), float(near[k]), float(far[k]))
-            if _is_free(free, bands, float(far[k])):
-                since_ns[ids[k]] = self._since_ns.get(ids[k], now_ns)
-        self._since_ns = since_ns
-        return np.array([now_ns - since_ns.get(track_id, now_ns) >= _FOR_NS for track_id in ids], np.bool_)
+        now_ns, ids = bodies.captured_ns, bodies.ids.tolist()
+        empty = _seen_empty(bodies, pose, self._mount, edges, free).tolist()
+        self._since_ns = {
+            track_id: self._since_ns.get(track_id, now_ns)
+            for track_id, gone in zip(ids, empty, strict=True)
+            if gone
+        }
+        return np.array(
+            [now_ns - self._since_ns.get(track_id, now_ns) >= _FOR_NS for track_id in ids], np.bool_
+        )
 
 
+@inlined
+def _covered_bands(
+    bodies: Bodies, k: int, ahead_m: float, left_m: float, free: FreeSpace
+) -> tuple[int, int, bool]:
+    """Of the bands that body k covers, at its near or its far face: how many there are, how many are seen
+    free beyond it, and whether one ends at a surface in its place. What is not known is not free.
+
+    ahead_m, left_m: where its centre is from the camera. Its near face is ahead of the camera.
+    """
+    near_m, far_m = ahead_m - bodies.half_view_m[k], ahead_m + bodies.half_view_m[k]
+    left_edge_m, right_edge_m = -left_m - bodies.half_across_m[k], -left_m + bodies.half_across_m[k]
+    first = min(left_edge_m / near_m, left_edge_m / far_m) - free.half_width_tan
+    last = max(right_edge_m / near_m, right_edge_m / far_m) + free.half_width_tan
+    covered, seen_free, there = 0, 0, False
+    for b in range(len(free.bearing_tan)):
+        if first <= free.bearing_tan[b] <= last:
+            covered += 1
+            seen_free += int(free.known_m[b] >= far_m and free.nearest_m[b] >= far_m)
+            there |= near_m - _AT_PLACE_M <= free.nearest_m[b] < far_m + _AT_PLACE_M
+    return covered, seen_free, there
+
+
+@compiled(Bodies, PlanarPose, CameraMount, ViewEdges, FreeSpace)
+def _seen_empty(
+    bodies: Bodies, pose: PlanarPose, mount: CameraMount, edges: ViewEdges, free: FreeSpace
+) -> NDArray[np.bool_]:
+    """(N,) which standing bodies are well in view, and all bands that they cover are seen free."""
+    empty = np.zeros(len(bodies.moving), np.bool_)
+    for k in range(len(empty)):
+        ahead, left = ahead_and_left(bodies.xy_m[k], pose, mount)
+        near = ahead - bodies.half_view_m[k]
+        inside = abs(left) + bodies.half_across_m[k] <= edges.edge_tan * near - _WELL_INSIDE_M
+        if bodies.moving[k] or not (near > 0.0 and inside):
+            continue
+        if not is_beyond_edges(bodies, k, near, mount.height_m, edges):
+            covered, seen_free, _ = _covered_bands(bodies, k, ahead, left, free)
+            empty[k] = 0 < covered == seen_free
+    return empty
+
+
+@compiled(Bodies, PlanarPose, CameraMount, ViewEdges, FreeSpace)
 def unproven(
     bodies: Bodies, pose: PlanarPose, mount: CameraMount, edges: ViewEdges, free: FreeSpace
 ) -> NDArray[np.bool_]:
@@ -85,51 +118,15 @@ def unproven(
 
     It is seen if every band that the body covers is free beyond it, or if one ends at a surface there.
     """
-    unseen = _unproven(bodies, pose, mount, free)
-    if np.count_nonzero(unseen):
-        ahead, _ = all_ahead_and_left(bodies.xy_m, pose, mount)
-        unseen &= ~beyond_edges(bodies, ahead - bodies.half_view_m, mount.height_m, edges)
-    return unseen
-
-
-def _bands(
-    free: FreeSpace, right_m: float, half_across_m: float, near_m: float, far_m: float
-) -> NDArray[np.bool_]:
-    """(B,) which bands a body covers, from its left to its right edge, at its near and its far face."""
-    edges_m = right_m + np.array([-half_across_m, half_across_m])
-    tans = np.concatenate((edges_m / near_m, edges_m / far_m))
-    covered: NDArray[np.bool_] = (free.bearing_tan >= tans.min() - free.half_width_tan) & (
-        free.bearing_tan <= tans.max() + free.half_width_tan
-    )
-    return covered
-
-
-def _is_free(free: FreeSpace, bands: NDArray[np.bool_], far_m: float) -> bool:
-    """Whether all of the bands (B,) are seen free beyond far_m; what is not known is not free."""
-    seen = (free.known_m[bands] >= far_m) & (free.nearest_m[bands] >= far_m)
-    return len(seen) > 0 and bool(seen.all())
-
-
-@compiled(Bodies, PlanarPose, CameraMount, FreeSpace)
-def _unproven(bodies: Bodies, pose: PlanarPose, mount: CameraMount, free: FreeSpace) -> NDArray[np.bool_]:
-    """As unproven(), but for bodies below or above the view."""
     unseen = np.zeros(len(bodies.moving), np.bool_)
     for k in range(len(unseen)):
         ahead, left = ahead_and_left(bodies.xy_m[k], pose, mount)
-        half_view_m, half_across_m = bodies.half_view_m[k], bodies.half_across_m[k]
-        near, far = ahead - half_view_m, ahead + half_view_m
+        near = ahead - bodies.half_view_m[k]
         speed_mps = math.hypot(bodies.measured_mps[k, 0], bodies.measured_mps[k, 1])
         stood = not bodies.moving[k] and bodies.tracked_s[k] >= _STOOD_S and speed_mps <= _STOOD_MPS
         if not (stood and 0.0 < near <= _NEAR_M):
             continue
-        left_edge, right_edge = -left - half_across_m, -left + half_across_m
-        first = min(left_edge / near, left_edge / far) - free.half_width_tan
-        last = max(right_edge / near, right_edge / far) + free.half_width_tan
-        covered, seen_free, there = 0, 0, False
-        for b in range(len(free.bearing_tan)):
-            if first <= free.bearing_tan[b] <= last:
-                covered += 1
-                seen_free += int(free.known_m[b] >= far and free.nearest_m[b] >= far)
-                there |= near - _AT_PLACE_M <= free.nearest_m[b] < far + _AT_PLACE_M
-        unseen[k] = covered > 0 and not there and seen_free < covered
+        if not is_beyond_edges(bodies, k, near, mount.height_m, edges):
+            covered, seen_free, there = _covered_bands(bodies, k, ahead, left, free)
+            unseen[k] = not there and seen_free < covered
     return unseen

@@ -14,6 +14,8 @@ import numpy as np
 from controller.decision.bodies import Bodies
 from controller.decision.unseen_motion import leftward_variance, significant_component
 from controller.decision.view_edges import (
+    EDGE_TOLERANCE_M,
+    EDGE_TOLERANCE_MPS,
     ViewEdges,
     ahead_and_left,
     all_ahead_and_left,
@@ -24,9 +26,6 @@ from hal.directions import along_and_left
 from hal.types import CameraMount, FloatArray, PlanarPose
 from vision.scene import FreeSpace
 
-# A place this far inside the side edge of the view still counts as outside; of a mover, for each second since
-# it was last seen, this much more.
-EDGE_TOLERANCE_M, EDGE_TOLERANCE_MPS = 0.3, 0.15
 _MIN_AXIS_DISTANCE_M = 0.1  # least distance from the camera's axis of a mover that was not seen to come in
 # A body out of view may have changed its velocity by this much per second.
 _VELOCITY_CHANGE_MPS2 = 0.25

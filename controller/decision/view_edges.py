@@ -24,6 +24,9 @@ BoolArray = NDArray[np.bool_]
 # Uncertainty of the height of a body that is seen only in part.
 UNCERTAIN_M = 0.1
 MIN_TAN, _MIN_M = 0.1, 1e-3  # lower bounds of divisors
+# A place this far inside the side edge of the view still counts as outside; of a mover, for each second since
+# it was last seen, this much more.
+EDGE_TOLERANCE_M, EDGE_TOLERANCE_MPS = 0.3, 0.15
 # A body farther behind the camera than about a robot's length no longer counts as out of view.
 _BEHIND_M = 2.0
 # Floor below the view beyond this distance is too much to be taken as free without having been seen.
@@ -89,11 +92,12 @@ def _highest_seen_m(ahead_m: float, height_m: float, up_tan: float) -> float:
 
 
 @inlined
-def _beyond(near_face_m: float, bottom_m: float, top_m: float, height_m: float, edges: ViewEdges) -> bool:
-    """As beyond_edges(), for one body."""
+def is_beyond_edges(bodies: Bodies, k: int, near_face_m: float, height_m: float, edges: ViewEdges) -> bool:
+    """As beyond_edges(), for body k."""
     lowest_m = _lowest_seen_m(near_face_m, height_m, edges.near_m)
-    below = near_face_m < edges.near_m and top_m < lowest_m + UNCERTAIN_M
-    return below or bottom_m > _highest_seen_m(near_face_m, height_m, edges.up_tan) - UNCERTAIN_M
+    below = near_face_m < edges.near_m and bodies.top_m[k] < lowest_m + UNCERTAIN_M
+    highest_m = _highest_seen_m(near_face_m, height_m, edges.up_tan)
+    return bool(below or bodies.bottom_m[k] > highest_m - UNCERTAIN_M)
 
 
 @compiled(Bodies, "float64[:], float64", ViewEdges)
@@ -104,31 +108,24 @@ def beyond_edges(bodies: Bodies, near_face_m: FloatArray, height_m: float, edges
     """
     beyond = np.empty(len(near_face_m), np.bool_)
     for k in range(len(near_face_m)):
-        beyond[k] = _beyond(near_face_m[k], bodies.bottom_m[k], bodies.top_m[k], height_m, edges)
+        beyond[k] = is_beyond_edges(bodies, k, near_face_m[k], height_m, edges)
     return beyond
 
 
-@compiled(Bodies, PlanarPose, CameraMount, ViewEdges, "float64, float64")
-def out_of_view(
-    bodies: Bodies,
-    pose: PlanarPose,
-    mount: CameraMount,
-    edges: ViewEdges,
-    tolerance_m: float,
-    tolerance_mps: float,
-) -> BoolArray:
+@compiled(Bodies, PlanarPose, CameraMount, ViewEdges)
+def out_of_view(bodies: Bodies, pose: PlanarPose, mount: CameraMount, edges: ViewEdges) -> BoolArray:
     """(N,) which bodies are beside, below or above the view, and no farther than _BEHIND_M behind the camera.
 
-    pose: of the robot that carries the camera. A centre up to tolerance_m inside the side edge counts as
-    beside the view; of a mover, tolerance_mps more for each second since it was last seen.
+    pose: of the robot that carries the camera. A centre up to EDGE_TOLERANCE_M inside the side edge counts as
+    beside the view; of a mover, EDGE_TOLERANCE_MPS more for each second since it was last seen, because the
+    uncertainty of its position grows.
     """
     out = np.empty(len(bodies.xy_m), np.bool_)
     for k in range(len(out)):
         ahead, left = ahead_and_left(bodies.xy_m[k], pose, mount)
-        within_m = tolerance_m + (tolerance_mps * bodies.unseen_s[k] if bodies.moving[k] else 0.0)
+        within_m = EDGE_TOLERANCE_M + (EDGE_TOLERANCE_MPS * bodies.unseen_s[k] if bodies.moving[k] else 0.0)
         beside = abs(left) > edges.edge_tan * max(ahead, 0.0) - within_m
-        near_face_m = ahead - bodies.half_view_m[k]
-        beyond = _beyond(near_face_m, bodies.bottom_m[k], bodies.top_m[k], mount.height_m, edges)
+        beyond = is_beyond_edges(bodies, k, ahead - bodies.half_view_m[k], mount.height_m, edges)
         out[k] = (beside or beyond) and ahead > -_BEHIND_M
     return out
 
