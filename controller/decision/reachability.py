@@ -75,11 +75,6 @@ def stops(ramps: SpeedRamps, times_s: FloatArray) -> Stops:
     return Stops(distance, speed > _STOPPED_MPS)
 
 
-def last_stop_before_entry(stopping: Stops, reached: Reach) -> int:
-    """Index of the last stop that ends before any body could be in the corridor at all; -1: none does."""
-    return _last_stop_before_entry(stopping.moves, reached.inside)
-
-
 def passes_clear(ramp: SpeedRamps, s_m: float, times_s: FloatArray, reached: Reach) -> bool:
     """Whether the robot touches nothing that could be blocked, at any time, along a single ramp."""
     distance_m = ramp.distance(times_s[None, :])
@@ -138,14 +133,14 @@ def count_safe_stops(stopping: Stops, s_m: float, reached: Reach, counts: NDArra
     return len(stopping.moves)
 
 
-@compiled("boolean[:, :], boolean[:, :]")
-def _last_stop_before_entry(moves: NDArray[np.bool_], inside: NDArray[np.bool_]) -> int:
-    """last_stop_before_entry() in arrays: moves (R, K) of the stops, inside (N, K) of the bodies."""
+@compiled(Stops, Reach)
+def last_stop_before_entry(stopping: Stops, reached: Reach) -> int:
+    """Index of the last stop that ends before any body could be in the corridor at all; -1: none does."""
     first = 0
-    for j in range(inside.shape[1] - 1, -1, -1):
-        if inside[:, j].any():
+    for j in range(reached.inside.shape[1] - 1, -1, -1):
+        if reached.inside[:, j].any():
             first = j
-    for i in range(len(moves) - 1, -1, -1):
-        if not moves[i, max(first - 1, 0)]:
+    for i in range(len(stopping.moves) - 1, -1, -1):
+        if not stopping.moves[i, max(first - 1, 0)]:
             return i
     return -1

@@ -39,20 +39,6 @@ _ALONG_TO_OUTWARD_RATIO = 4.0
 _SAME_VELOCITY_SIGMAS = 2.0
 
 
-def unseen_or_approaching(
-    bodies: Bodies, widest_half_m: FloatArray, pose: PlanarPose
-) -> tuple[BoolArray, BoolArray]:
-    """Two masks (N,) of the bodies judged standing: not seen in this scene; and seen, but approaching.
-
-    Approaching: the measured velocity towards the axis of a robot at pose (the line straight ahead) exceeds
-    the noise; of a body as tall as a person, less suffices. A body is in neither mask if it was tracked for
-    MIN_TRACKED_S or less, or was never wider than MIN_MOVER_HALF_WIDTH_M. widest_half_m (N,): half of the
-    greatest width that each was seen with.
-    """
-    out, comes = _unseen_or_approaching(bodies, widest_half_m, pose)
-    return out, comes
-
-
 def as_tall_as_a_person(bodies: Bodies) -> BoolArray:
     """(N,) which bodies are."""
     return np.asarray((bodies.top_m >= _PERSON_FROM_M) & (bodies.top_m <= _PERSON_TO_M))
@@ -72,6 +58,38 @@ def leftward_variance(covariance: FloatArray, cos: float, sin: float) -> float:
     """
     mixed = covariance[0, 1] + covariance[1, 0]
     return float((covariance[0, 0] * sin - mixed * cos) * sin + covariance[1, 1] * cos * cos)
+
+
+@compiled(Bodies, "float64[:]", PlanarPose)
+def unseen_or_approaching(
+    bodies: Bodies, widest_half_m: FloatArray, pose: PlanarPose
+) -> tuple[BoolArray, BoolArray]:
+    """Two masks (N,) of the bodies judged standing: not seen in this scene; and seen, but approaching.
+
+    Approaching: the measured velocity towards the axis of a robot at pose (the line straight ahead) exceeds
+    the noise; of a body as tall as a person, less suffices. A body is in neither mask if it was tracked for
+    MIN_TRACKED_S or less, or was never wider than MIN_MOVER_HALF_WIDTH_M. widest_half_m (N,): half of the
+    greatest width that each was seen with.
+    """
+    cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
+    out, comes = np.zeros(len(bodies.moving), np.bool_), np.zeros(len(bodies.moving), np.bool_)
+    for k in range(len(out)):
+        # tracked_s and not age_s: the velocity of a new track was hardly measured, however long something
+        # has stood there.
+        hardly_tracked = bodies.tracked_s[k] <= MIN_TRACKED_S
+        if bodies.moving[k] or hardly_tracked or widest_half_m[k] <= MIN_MOVER_HALF_WIDTH_M:
+            continue
+        out[k] = bodies.unseen_s[k] > 0.0
+        _, left_m = along_and_left(bodies.xy_m[k, 0] - pose.x_m, bodies.xy_m[k, 1] - pose.y_m, cos, sin)
+        vx, vy = bodies.measured_mps[k]
+        _, leftward_mps = along_and_left(vx, vy, cos, sin)
+        variance = leftward_variance(bodies.covariance[k], cos, sin)
+        sigmas, least_mps = _APPROACH_MIN_SIGMAS, _APPROACH_MIN_MPS
+        if _PERSON_FROM_M <= bodies.top_m[k] <= _PERSON_TO_M:
+            sigmas, least_mps = _PERSON_MIN_SIGMAS, _PERSON_MIN_MPS
+        clear_mps = max(sigmas * math.sqrt(variance), least_mps)
+        comes[k] = not out[k] and -np.sign(left_m) * leftward_mps > clear_mps
+    return out, comes
 
 
 @inlined
@@ -153,28 +171,3 @@ def _moves_before_verdict(bodies: Bodies, sigmas: float, max_mps: float) -> Bool
         fast = squared**2 > sigmas**2 * variance and squared > _APPROACH_MIN_MPS**2
         moves[k] = fast and math.hypot(x, y) <= max_mps
     return moves
-
-
-@compiled(Bodies, "float64[:]", PlanarPose)
-def _unseen_or_approaching(bodies: Bodies, widest_half_m: FloatArray, pose: PlanarPose) -> BoolArray:
-    """(2, N) the masks of unseen_or_approaching()."""
-    cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
-    answers = np.zeros((2, len(bodies.moving)), np.bool_)
-    out, comes = answers
-    for k in range(len(bodies.moving)):
-        # tracked_s and not age_s: the velocity of a new track was hardly measured, however long something
-        # has stood there.
-        hardly_tracked = bodies.tracked_s[k] <= MIN_TRACKED_S
-        if bodies.moving[k] or hardly_tracked or widest_half_m[k] <= MIN_MOVER_HALF_WIDTH_M:
-            continue
-        out[k] = bodies.unseen_s[k] > 0.0
-        _, left_m = along_and_left(bodies.xy_m[k, 0] - pose.x_m, bodies.xy_m[k, 1] - pose.y_m, cos, sin)
-        vx, vy = bodies.measured_mps[k]
-        _, leftward_mps = along_and_left(vx, vy, cos, sin)
-        variance = leftward_variance(bodies.covariance[k], cos, sin)
-        sigmas, least_mps = _APPROACH_MIN_SIGMAS, _APPROACH_MIN_MPS
-        if _PERSON_FROM_M <= bodies.top_m[k] <= _PERSON_TO_M:
-            sigmas, least_mps = _PERSON_MIN_SIGMAS, _PERSON_MIN_MPS
-        clear_mps = max(sigmas * math.sqrt(variance), least_mps)
-        comes[k] = not out[k] and -np.sign(left_m) * leftward_mps > clear_mps
-    return answers

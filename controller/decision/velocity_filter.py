@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from controller.decision.bodies import Bodies
 from hal.clocks import NS_PER_S
-from hal.compiled import compiled, inlined
+from hal.compiled import compiled
 from hal.types import FloatArray
 
 # Process noise: people change their velocity by this standard deviation in one second, as a random walk (it
@@ -59,29 +59,19 @@ class SteadyVelocities:
         moving_s, velocity, variance, innovation = _averaged(
             seen, self._ids, self._moving_s, self._velocity, self._variance, dt_s
         )
-        self._ids, self._moving_s, self._velocity, self._variance = (
-            seen.ids,
-            moving_s[:, 0],
-            velocity,
-            variance,
-        )
+        self._ids, self._moving_s, self._velocity, self._variance = seen.ids, moving_s, velocity, variance
         return replace(seen, velocity_mps=velocity, innovation_mps=innovation)
 
 
-@inlined
-def _missing_to_walking(velocity_mps: FloatArray) -> FloatArray:
+@compiled("float64[:, :]")
+def missing_to_walking(velocity_mps: FloatArray) -> FloatArray:
+    """(N, 2) how much faster bodies that set off with velocity_mps (N, 2) may become, straight on."""
     missing = np.zeros_like(velocity_mps)
     for k in range(len(velocity_mps)):
         speed_mps = max(math.hypot(velocity_mps[k, 0], velocity_mps[k, 1]), _LEAST_MPS)
         for axis in range(2):
             missing[k, axis] = velocity_mps[k, axis] * max(_WALKING_MPS / speed_mps - 1.0, 0.0)
     return missing
-
-
-@compiled("float64[:, :]")
-def missing_to_walking(velocity_mps: FloatArray) -> FloatArray:
-    """(N, 2) how much faster bodies that set off with velocity_mps (N, 2) may become, straight on."""
-    return _missing_to_walking(velocity_mps)
 
 
 @compiled(Bodies, "int64[:], float64[:], float64[:, :], float64[:, :], float64")
@@ -92,14 +82,14 @@ def _averaged(
     before_mps: FloatArray,
     before_variance: FloatArray,
     dt_s: float,
-) -> FloatArray:
-    """(4, N, 2) for how long N bodies have moved, velocity, its variance, and the innovation.
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """For how long N bodies have moved (N,); velocity, its variance, and the innovation, (N, 2) each.
 
     seen: with measured velocities. before_ids, before_moving_s (M,), before_mps and before_variance (M, 2):
     the bodies of the last scene. A body that did not move then starts with its measurement.
     """
-    result = np.zeros((4, *seen.velocity_mps.shape))
-    moving_s, velocity, variance, innovation = result
+    moving_s, velocity = np.zeros(len(seen.ids)), np.zeros(seen.velocity_mps.shape)
+    variance, innovation = np.zeros(velocity.shape), np.zeros(velocity.shape)
     correlated = max(_CORRELATED_S / dt_s, 1.0)
     for k in range(len(seen.ids)):
         before = -1
@@ -120,9 +110,9 @@ def _averaged(
             differs = measured - average
             beyond_noise = max(abs(differs) - _NOISE_SIGMAS * math.sqrt(spread), 0.0)
             innovation[k, axis] = _SURPRISE_GAIN * math.copysign(beyond_noise, differs)
-        if 0.0 < moving_s[k, 0] < min(_SETTING_OFF_S, seen.tracked_s[k] - _STOOD_S):
-            missing_mps = _missing_to_walking(velocity[k : k + 1])[0]
+        if 0.0 < moving_s[k] < min(_SETTING_OFF_S, seen.tracked_s[k] - _STOOD_S):
+            missing_mps = missing_to_walking(velocity[k : k + 1])[0]
             for axis in range(2):
                 if abs(missing_mps[axis]) > abs(innovation[k, axis]):
                     innovation[k, axis] = missing_mps[axis]
-    return result
+    return moving_s, velocity, variance, innovation
