@@ -60,6 +60,9 @@ class SurfacesOnPath:
 
 @dataclass(slots=True)
 class _Corner:
+    """A corner that was noted: its place and side, its distance from the swept width, and how well it is
+    confirmed (_MIN_SCORE)."""
+
     s_m: float
     left: bool
     beside_m: float
@@ -97,7 +100,7 @@ class BlindCorners:
         for corner in self._corners:
             # Nearer than _SURE_M, a corner is not given up for not being seen.
             corner.score -= 1 if corner.s_m - front_s_m > _SURE_M else 0
-            corner.score -= 2 if _closed(surfaces, stands, corner.s_m, corner.left, corner.beside_m) else 0
+            corner.score -= 2 if _closed(surfaces, stands, corner) else 0
         s_m, d_m, half_width_m = surfaces.s_m, surfaces.d_m, surfaces.half_width_m
         ends = _blind_ends(surfaces, stands, band_tan, front_s_m, self._beside_m)
         for end in ends.tolist():
@@ -160,22 +163,20 @@ def _ends_blind(points: SurfacesOnPath, first: int, last: int, inward: int, band
     return _passage_behind(points, last, last + inward, band_tan)
 
 
-@compiled(SurfacesOnPath, "boolean[:], float64, boolean, float64")
-def _closed(
-    points: SurfacesOnPath, stands: NDArray[np.bool_], s_m: float, left: bool, beside_m: float
-) -> bool:
-    """Whether no passage can begin at the corner at s_m: what stands there leaves no gap as wide.
+@compiled(SurfacesOnPath, "boolean[:]", _Corner)
+def _closed(points: SurfacesOnPath, stands: NDArray[np.bool_], corner: _Corner) -> bool:
+    """Whether no passage can begin at the corner: what stands there leaves no gap as wide.
 
     A post or a box in front of a rack's goods hides a strip of them from afar, and the strip grows narrower
-    on the way there. left, beside_m: side of the corner, and its distance from the swept width.
+    on the way there.
     """
-    begin_m, end_m = s_m - _PLACE_M, s_m + _PLACE_M + _PASSAGE_M
+    begin_m, end_m = corner.s_m - _PLACE_M, corner.s_m + _PLACE_M + _PASSAGE_M
     along_m = np.empty(len(points.bands) + 1)
     along_m[0], count = end_m, 1
     for k in range(len(points.bands)):
         aside_m = abs(points.d_m[k]) - points.half_width_m[k]
-        at_face = stands[k] and 0.0 < aside_m < beside_m + _STEP_ASIDE_M
-        if at_face and (points.d_m[k] > 0.0) == left and begin_m < points.s_m[k] < end_m:
+        at_face = stands[k] and 0.0 < aside_m < corner.beside_m + _STEP_ASIDE_M
+        if at_face and (points.d_m[k] > 0.0) == corner.left and begin_m < points.s_m[k] < end_m:
             along_m[count] = points.s_m[k]
             count += 1
     last_m = begin_m

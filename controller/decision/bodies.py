@@ -65,7 +65,7 @@ class Bodies:
         return Bodies(self.captured_ns, *[array.take(rows, 0) for array in _arrays_of(self)])
 
     def moved_to(self, captured_ns: int, xy_m: FloatArray, unseen_s: FloatArray) -> Bodies:
-        """The same bodies at a later time, at xy_m (N, 2)."""
+        """The same bodies at a later time, at xy_m (N, 2). As replace(), but ten times as fast."""
         return Bodies(
             captured_ns,
             self.ids,

@@ -72,8 +72,7 @@ class WorstCase:
         )
         self._speeds = np.linspace(0.0, limits.max_speed_mps, _SPEEDS)
         self._latency_s = math.nan
-        self._stops_early = self._stops_now = self._stops(self._speeds, 0.0, 0.0)
-        self._stops_after_confirming = self._stops_now
+        self._prepare(latency_s=0.0)
 
     def limit(self, watched: Watched, s_m: float, motion: Motion, chosen_mps: float) -> Limit | None:
         """The greatest speed from which the robot at s_m could still stop in time; None: no need to slow.
@@ -151,6 +150,7 @@ class WorstCase:
         return float(self._speeds[max(stand - 1, 0)]) if stand < len(self._speeds) else math.inf
 
     def _prepare(self, latency_s: float) -> None:
+        """Make the stops that all decisions with this latency compare, and how far the longest one leads."""
         if latency_s == self._latency_s:
             return
         self._latency_s = latency_s
