@@ -9,6 +9,7 @@ limits.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -92,7 +93,7 @@ class Sight:
         self._update_view_edges(free)
         on_path = self._on_path(surfaces, s_m)
         belongs = surfaces.of(explained_by)
-        in_corridor, nearest_s, clearance_m, stands = _surfaces_in_corridor(
+        found = _surfaces_in_corridor(
             on_path,
             surfaces.half_band_m,
             belongs,
@@ -101,24 +102,21 @@ class Sight:
             self._lateral_m,
             len(free.bearing_tan),
         )
-        self.corners.look(on_path, stands, 2.0 * free.half_width_tan, s_m + self._corridor.front_m)
-        if nearest_s < math.inf:
-            self.surface_clearance_m = clearance_m
-        counts, explained = in_corridor[on_path.bands], belongs.any(axis=1)
-        points = counts & ~explained & (on_path.s_m <= nearest_s + SAME_SURFACE_M)
-        explained_s = self._explained(on_path, counts & explained, points)
+        self.corners.look(on_path, found.stands, 2.0 * free.half_width_tan, s_m + self._corridor.front_m)
+        if found.nearest_s_m < math.inf:
+            self.surface_clearance_m = found.clearance_m
+        explained_s = self._explained(on_path, found.explained, found.nearest)
         blind_s_m = s_m + self._mount.forward_m + self._out_of_view_within_m
-        beside_mover = _beside_mover(surfaces.points_m[points], explained_by)
-        nearest = Nearest(nearest_s, beside_mover, clearance_m < -_CLEARANCE_ERROR_M)
+        beside_mover = _beside_mover(surfaces.points_m[found.nearest], explained_by)
+        nearest = Nearest(found.nearest_s_m, beside_mover, found.clearance_m < -_CLEARANCE_ERROR_M)
         self._surface.note(nearest, s_m, blind_s_m, captured_ns, standing, explained_s)
-        self._note_floor(free, pose, s_m, captured_ns, in_corridor)
+        self._note_floor(free, pose, s_m, captured_ns, found.in_bands)
 
     def _explained(self, on_path: SurfacesOnPath, explained: BoolArray, nearest: BoolArray) -> float:
         """Path coordinate of the surface in the corridor that bodies explain, where the nearest unexplained
         one was last seen across the path; inf: they cover too little of it.
 
-        explained, nearest (P,): which surfaces in the corridor belong to bodies, and which are the nearest
-        ones of the others.
+        explained, nearest (P,): see _InCorridor.
         """
         if nearest.any():
             across_m = on_path.d_m[nearest]
@@ -161,12 +159,12 @@ class Sight:
         pose: PlanarPose,
         s_m: float,
         captured_ns: int,
-        in_corridor: BoolArray,
+        in_bands: BoolArray,
     ) -> None:
         """Mark the cells whose width was seen free, then find the first unknown cell ahead.
 
-        in_corridor (B,): in which bands a surface is in the corridor. It limits the speed itself, so behind
-        it nothing has to be seen.
+        in_bands (B,): see _InCorridor. Such a surface limits the speed itself, so behind it nothing has to be
+        seen.
         """
         first, last = _between(self._cells, s_m, s_m + self._sight.range_m + self._mount.forward_m)
         if last > first and len(free.bearing_tan):
@@ -177,7 +175,7 @@ class Sight:
                 min_m = max(min_m, self._floor_from_m)
             lanes = self._lanes[:, first:last]
             # Ask for the far edge of a cell: it is not known if only its beginning was seen.
-            seen = seen_of(free, pose, self._mount, lanes, 0.5 * _CELL_M, min_m, in_corridor)
+            seen = seen_of(free, pose, self._mount, lanes, 0.5 * _CELL_M, min_m, in_bands)
             self._seen_ns = _marked(self._seen_ns, first, seen, self._sight.known_share, captured_ns)
         # Cells too near to be seen again stay free once they were seen free; bodies that may come there are
         # covered by controller/decision/out_of_view.py and worst_case_limit.py.
@@ -205,6 +203,26 @@ def _beside_mover(points_m: FloatArray, bodies: Bodies) -> bool:
     return bool(bodies.select(bodies.moving).covers(points_m, reach_m, _BESIDE_MOVER_M).any())
 
 
+class _InCorridor(NamedTuple):
+    """Which of P surfaces are in the corridor, and which of these bodies explain.
+
+    in_bands: (B,) in which bands of the scan a surface is in the corridor.
+    explained: (P,) those in the corridor that belong to bodies.
+    nearest: (P,) those that belong to none and are about as near as the nearest of them. A wall across the
+        way begins beside it.
+    nearest_s_m: path coordinate of that one; inf if there is none.
+    clearance_m: free floor between the nearest ones and the corridor; inf if there are none.
+    stands: (P,) those, in the corridor or not, that belong to no mover.
+    """
+
+    in_bands: BoolArray
+    explained: BoolArray
+    nearest: BoolArray
+    nearest_s_m: float
+    clearance_m: float
+    stands: BoolArray
+
+
 @compiled(SurfacesOnPath, "float64[:], boolean[:, :], boolean[:], float64, float64, int64")
 def _surfaces_in_corridor(
     on_path: SurfacesOnPath,
@@ -214,37 +232,30 @@ def _surfaces_in_corridor(
     s_m: float,
     lateral_m: float,
     bands_count: int,
-) -> tuple[BoolArray, float, float, BoolArray]:
-    """Which surfaces are in the corridor, and which of them bodies explain.
-
-    Returns in which of the B bands a surface is in the corridor (B,); the least s_m of such a surface that
-    belongs to no body, inf if there is none; the free floor between that one and the corridor; which
-    surfaces (P,) belong to no mover. belongs (P, N): which surfaces belong to which bodies. moving (N,):
-    which bodies move.
-    """
+) -> _InCorridor:
+    """Judge the surfaces beyond s_m. belongs (P, N): which belong to which of N bodies; moving (N,)."""
     count = len(on_path.bands)
-    in_corridor, stands = np.zeros(bands_count, np.bool_), np.ones(count, np.bool_)
-    nearest_s = clearance_m = math.inf
-    counts = np.zeros(count, np.bool_)
+    in_bands, stands = np.zeros(bands_count, np.bool_), np.ones(count, np.bool_)
+    explained, nearest = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
+    nearest_s_m = clearance_m = math.inf
     for i in range(count):
-        explained = False
+        of_body = False
         for k in range(len(moving)):
             if belongs[i, k]:
-                explained = True
+                of_body = True
                 stands[i] &= not moving[k]
-        surface_s_m, half_width_m = on_path.s_m[i], on_path.half_width_m[i]
         aside_m = abs(on_path.d_m[i]) - half_band_m[i]
-        if aside_m <= half_width_m + lateral_m and surface_s_m > s_m:
-            in_corridor[on_path.bands[i]] = True
-            if not explained:
-                counts[i] = True
-                nearest_s = min(nearest_s, surface_s_m)
+        if aside_m <= on_path.half_width_m[i] + lateral_m and on_path.s_m[i] > s_m:
+            in_bands[on_path.bands[i]] = True
+            explained[i], nearest[i] = of_body, not of_body
+            if not of_body:
+                nearest_s_m = min(nearest_s_m, on_path.s_m[i])
     for i in range(count):
-        # A wall across the way begins beside it.
-        if counts[i] and on_path.s_m[i] <= nearest_s + SAME_SURFACE_M:
+        nearest[i] &= on_path.s_m[i] <= nearest_s_m + SAME_SURFACE_M
+        if nearest[i]:
             aside_m = abs(on_path.d_m[i]) - half_band_m[i]
             clearance_m = min(clearance_m, aside_m - on_path.half_width_m[i])
-    return in_corridor, nearest_s, clearance_m, stands
+    return _InCorridor(in_bands, explained, nearest, nearest_s_m, clearance_m, stands)
 
 
 @compiled("float64[:], float64, float64")
