@@ -89,8 +89,7 @@ def track(
         expected,
         back - pixels,
         covariance,
-        settings.forward_backward_sigmas,
-        settings.forward_backward_px,
+        settings,
         height,
         width,
     )
@@ -166,15 +165,14 @@ def mahalanobis(miss: NDArray[np.float32], covariance: NDArray[np.float32]) -> N
 
 
 @compiled(
-    "float32[:, ::1], float32[:, ::1], float32[:, ::1], float32[:, ::1], float64, float64, int64, int64"
+    "float32[:, ::1], float32[:, ::1], float32[:, ::1], float32[:, ::1]", FragmentSettings, "int64, int64"
 )
 def _confirmed(
     there: NDArray[np.float32],
     expected: NDArray[np.float32],
     miss: NDArray[np.float32],
     covariance: NDArray[np.float32],
-    most_sigmas: float,
-    most_px: float,
+    settings: FragmentSettings,
     height: int,
     width: int,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_]]:
@@ -197,6 +195,7 @@ def _confirmed(
         end[n, 0], end[n, 1] = u, v
         error_px[n] = max(abs(u - expected[n, 0]), abs(v - expected[n, 1]))
         inside = u >= _RIM_PX and u <= width - 1 - _RIM_PX and v >= _RIM_PX and v <= height - 1 - _RIM_PX
+        most_px = settings.forward_backward_px
         near = abs(miss[n, 0]) <= most_px and abs(miss[n, 1]) <= most_px
-        good[n] = inside and near and squared[n] <= np.float32(most_sigmas**2)
+        good[n] = inside and near and squared[n] <= np.float32(settings.forward_backward_sigmas**2)
     return end, error_px, good

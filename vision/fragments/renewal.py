@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from config.perception import PerceptionConfig
+from config.perception import FragmentSettings, PerceptionConfig
 from hal.compiled import compiled, inlined
 from hal.types import FloatArray, RgbdFrame
 from vision.fragments.candidates import (
@@ -56,8 +56,7 @@ class Renewal:
         settings = self._config.fragments
         if self._room(len(ends_px)) * _FEW_MISSING >= settings.max_fragments:
             return np.zeros(len(ends_px), np.bool_)
-        per_tile, ends_px = settings.fragments_per_tile, np.ascontiguousarray(ends_px)
-        return _surplus(ends_px, on_movers, settings.tile_px, *shape, per_tile)
+        return _surplus(np.ascontiguousarray(ends_px), on_movers, settings, *shape)
 
     def _room(self, present: int) -> int:
         return self._config.fragments.max_fragments - present
@@ -151,12 +150,11 @@ class Renewal:
         room: maximum number of fragments in all, and of fragments without depth.
         """
         settings, config = self._config.fragments, self._config
-        tile_px, per_tile = settings.tile_px, settings.fragments_per_tile
-        wanted = _wanted(longest_first(candidates), counts, tile_px, per_tile)
+        wanted = _wanted(longest_first(candidates), counts, settings)
         snapped, tensor = trackable_segments(grey, wanted, ends_px, _MIN_END_DISTANCE_PX)
         surface = depth_along(snapped, frame, config)
         whole = on_one_surface(surface.near_m, config)
-        picked = _picked(snapped, surface.near_m, whole, counts, tile_px, per_tile, *room)
+        picked = _picked(snapped, surface.near_m, whole, counts, settings, *room)
         return new_fragments(picked, snapped, tensor, surface, settings)
 
 
@@ -190,21 +188,20 @@ def _tile_counts(ends_px: NDArray[np.float32], tile_px: int, height: int, width:
     return counts
 
 
-@compiled("float32[:, :, ::1], bool_[::1], int64, int64, int64, int64")
+@compiled("float32[:, :, ::1], bool_[::1]", FragmentSettings, "int64, int64")
 def _surplus(
     ends_px: NDArray[np.float32],
     spare: NDArray[np.bool_],
-    tile_px: int,
+    settings: FragmentSettings,
     height: int,
     width: int,
-    per_tile: int,
 ) -> NDArray[np.bool_]:
-    """(N,) spare fragments with their middle in a tile that holds per_tile fragments before them."""
-    seen = _no_tiles(height, width, tile_px)
+    """(N,) spare fragments with their middle in a tile that is full of fragments before them."""
+    seen = _no_tiles(height, width, settings.tile_px)
     surplus = np.zeros(len(ends_px), np.bool_)
     for n in range(len(ends_px)):
-        tile = _middle_tile(seen, ends_px[n], tile_px)
-        surplus[n] = spare[n] and seen[tile] >= per_tile
+        tile = _middle_tile(seen, ends_px[n], settings.tile_px)
+        surplus[n] = spare[n] and seen[tile] >= settings.fragments_per_tile
         seen[tile] += 1
     return surplus
 
@@ -222,32 +219,32 @@ def _outside_of(full: NDArray[np.bool_], tile_px: int, edges: GreyImage, top: in
     return result
 
 
-@compiled("float32[:, :, ::1], int64[:, ::1], int64, int64")
+@compiled("float32[:, :, ::1], int64[:, ::1]", FragmentSettings)
 def _wanted(
-    segments_px: NDArray[np.float32], counts: NDArray[np.int64], tile_px: int, per_tile: int
+    segments_px: NDArray[np.float32], counts: NDArray[np.int64], settings: FragmentSettings
 ) -> NDArray[np.float32]:
     """The first few of segments (N, 2, 2) with their middle in each tile where some are missing.
 
-    counts: ends in each tile. per_tile: wanted number of segments in a tile.
+    counts: ends in each tile.
     """
     wanted, count, seen = np.empty(len(segments_px), np.intp), 0, np.zeros_like(counts)
     for n in range(len(segments_px)):
-        tile = _middle_tile(counts, segments_px[n], tile_px)
-        if seen[tile] < min(4 * (per_tile - counts[tile] // 2), _CANDIDATES_PER_TILE):
+        tile = _middle_tile(counts, segments_px[n], settings.tile_px)
+        missing = settings.fragments_per_tile - counts[tile] // 2
+        if seen[tile] < min(4 * missing, _CANDIDATES_PER_TILE):
             wanted[count] = n
             count += 1
         seen[tile] += 1
     return segments_px[wanted[:count]]
 
 
-@compiled("float32[:, :, ::1], float64[:, ::1], bool_[::1], int64[:, ::1], int64, int64, int64, int64")
+@compiled("float32[:, :, ::1], float64[:, ::1], bool_[::1], int64[:, ::1]", FragmentSettings, "int64, int64")
 def _picked(
     segments_px: NDArray[np.float32],
     near_m: FloatArray,
     whole: NDArray[np.bool_],
     counts: NDArray[np.int64],
-    tile_px: int,
-    per_tile: int,
+    settings: FragmentSettings,
     room: int,
     far_room: int,
 ) -> NDArray[np.intp]:
@@ -263,8 +260,8 @@ def _picked(
             far_room -= 1
         if not (whole[n] or (beyond and far_room >= 0)):
             continue
-        tile = _middle_tile(counts, segments_px[n], tile_px)
-        if seen[tile] < per_tile - counts[tile] // 2 and count < room:
+        tile = _middle_tile(counts, segments_px[n], settings.tile_px)
+        if seen[tile] < settings.fragments_per_tile - counts[tile] // 2 and count < room:
             picked[count] = n
             count += 1
         seen[tile] += 1

@@ -11,6 +11,7 @@ from vision.fragments.optical_flow import Flow, _confirmed, mahalanobis, pyramid
 from vision.fragments.optical_flow import track as track_in
 
 SETTINGS = FragmentSettings()
+NARROW = FragmentSettings(forward_backward_sigmas=3.0, forward_backward_px=4.0)
 
 
 def pattern(seed: int) -> GreyImage:
@@ -200,7 +201,7 @@ def test_end_is_confirmed_if_the_backward_search_returns_to_it(
 ) -> None:
     there, off = np.array([place], np.float32), np.array([miss], np.float32)
     covariance = np.array([[4.0, 0.0, 0.25]], np.float32)
-    end, _, confirmed = _confirmed(there, there, off, covariance, 3.0, 4.0, 60, 100)
+    end, _, confirmed = _confirmed(there, there, off, covariance, NARROW, 60, 100)
     np.testing.assert_array_equal(end, there)
     assert confirmed.tolist() == [good]
 
@@ -209,6 +210,6 @@ def test_an_end_is_where_it_is_expected_along_its_edge_and_where_it_is_found_acr
     """Variances 12 and 0 px^2 of the search against 4 of the expectation: a quarter and all of the way."""
     there, expected = np.array([[38.0, 38.0]], np.float32), np.array([[30.0, 30.0]], np.float32)
     covariance, none = np.array([[12.0, 0.0, 0.0]], np.float32), np.zeros((1, 2), np.float32)
-    end, error_px, _ = _confirmed(there, expected, none, covariance, 3.0, 4.0, 60, 100)
+    end, error_px, _ = _confirmed(there, expected, none, covariance, NARROW, 60, 100)
     np.testing.assert_allclose(end, [[32.0, 38.0]], rtol=1e-6)
     np.testing.assert_allclose(error_px, [8.0], rtol=1e-6)

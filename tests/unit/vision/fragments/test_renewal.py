@@ -11,6 +11,8 @@ from hal.types import RgbdFrame
 from tests.support.painted import VGA
 from vision.fragments.renewal import PART_PX, Renewal, _outside_of, _picked, _tile_counts, _wanted
 
+TILES = FragmentSettings(tile_px=40, fragments_per_tile=2)
+
 
 def picture() -> tuple[RgbdFrame, NDArray[np.uint8]]:
     """Black and white cells of 48 px, all 3 m away."""
@@ -154,9 +156,9 @@ def test_a_tile_is_offered_the_first_few_segments_and_none_when_it_is_full() -> 
     """Three tiles that hold none, one and two of the two fragments, that is ends twice as many."""
     counts = np.array([[0, 2, 4]])
     row = segments(*((20.0 + 40.0 * (k % 3), 1.0 + k) for k in range(18)))
-    np.testing.assert_array_equal(_wanted(row, counts, 40, 2), row[[0, 1, 3, 4, 6, 7, 9, 10]])
+    np.testing.assert_array_equal(_wanted(row, counts, TILES), row[[0, 1, 3, 4, 6, 7, 9, 10]])
     # A middle at the border of two tiles is in the second one.
-    assert len(_wanted(segments((79.5, 5.0), (80.0, 5.0)), counts, 40, 2)) == 1
+    assert len(_wanted(segments((79.5, 5.0), (80.0, 5.0)), counts, TILES)) == 1
 
 
 def picked(near_m: list[float], room: int = 9, far_room: int = 9, whole: bool = True) -> list[int]:
@@ -164,7 +166,7 @@ def picked(near_m: list[float], room: int = 9, far_room: int = 9, whole: bool = 
     turns = segments(*((20.0 + 40.0 * (k % 2), 5.0) for k in range(len(near_m))))
     depth = np.repeat(np.array(near_m).reshape(-1, 1), 5, axis=1)
     good = ~np.isnan(depth[:, 0]) & whole
-    result: list[int] = _picked(turns, depth, good, np.array([[0, 2]]), 40, 2, room, far_room).tolist()
+    result: list[int] = _picked(turns, depth, good, np.array([[0, 2]]), TILES, room, far_room).tolist()
     return result
 
 
