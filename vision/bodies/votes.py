@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.compiled import compiled
-from hal.types import FloatArray
+from hal.types import FlagMatrix, FloatArray
 from vision.bodies.arrivals import MUCH_ARRIVED_CELLS
 from vision.bodies.tracks import Tracks
 from vision.depth.connected import IntGrid, spread_labels
@@ -56,7 +56,7 @@ class Ballot:
     votes: the winner's votes, (P,).
     """
 
-    claims: NDArray[np.bool_]
+    claims: FlagMatrix
     votes_of: NDArray[np.intp]
     winner: NDArray[np.int32]
     votes: NDArray[np.intp]
@@ -122,17 +122,13 @@ def _winners(
     return winner, votes
 
 
+@compiled(Ballot, "boolean[::1]")
 def border_is_guess(ballot: Ballot, mover: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """(T,) movers, of mover (T,), all of whose parts are claimed by a static track as well.
 
     The border between the two within such a part is a guess.
     """
-    return _border_is_guess(ballot.claims, mover)
-
-
-@compiled("boolean[:, ::1], boolean[::1]")
-def _border_is_guess(claims: NDArray[np.bool_], mover: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    parts, tracks = claims.shape
+    claims, (parts, tracks) = ballot.claims, ballot.claims.shape
     somewhere, alone = np.zeros(tracks, np.bool_), np.zeros(tracks, np.bool_)
     for p in range(parts):
         shared = False
