@@ -55,7 +55,6 @@ _MIN_MOVING_MPS = 0.3  # a slower track moves like anything static
 class _Pairs:
     """K pairs of a smaller and a larger track, (K,) each.
 
-    small, large: their indices.
     small_px, large_px: their boxes in the image, u0, v0, u1, v1, (K, 4).
     gap_m, stacked, within: see Relations.
     away_m: difference of their depths.
@@ -72,8 +71,6 @@ class _Pairs:
         _EQUAL_MPS at most.
     """
 
-    small: NDArray[np.intp]
-    large: NDArray[np.intp]
     small_px: FloatArray
     large_px: FloatArray
     gap_m: FloatArray
@@ -153,10 +150,8 @@ def _paired(
     overlapping = relation.overlap >= _OVERLAP
     person_width = right_m - left_m <= SINGLE_WIDTH_M
     return _Pairs(
-        small,
-        large,
-        regions.bbox_px[small],
-        regions.bbox_px[large],
+        small_px=regions.bbox_px[small],
+        large_px=regions.bbox_px[large],
         gap_m=relation.gap_m,
         stacked=relation.stacked,
         within=relation.within,

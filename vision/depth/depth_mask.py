@@ -22,6 +22,8 @@ from vision.depth.depth_noise import depth_sigma_of
 _REACH_PX, _EVERY_PX, _SAMPLES = 6, 3, 25
 _NEAR_RANK = 4  # the 5th nearest of 25 samples: a corner of a body still covers a fifth of them
 _MIN_SUPPORT = 4  # minimum of valid samples, of 25: fewer are stray ones
+# Samples that are behind the near ones by more than this, the sum of both, are of another surface.
+_SAME_M, _SAME_SIGMAS = 0.06, 3.0
 _HOLES = 0.25  # share of samples without depth from which on there may be another, unseen surface
 UNSEEN_M = 12.0  # assumed depth of an unseen surface
 _CUT_OFF = np.iinfo(np.uint16).max  # raw depth that stands for this distance and all larger ones
@@ -127,7 +129,7 @@ def _surfaces(
         _note_nearest(sample_m, measured, nearest_m)
         # With many holes the rank is lowered to a third of the valid samples.
         anchor_m = nearest_m[min(_NEAR_RANK, within // 3)]
-        gate_m = np.float32(0.06 + 3.0 * depth_sigma_of(anchor_m, noise))
+        gate_m = np.float32(_SAME_M + _SAME_SIGMAS * depth_sigma_of(anchor_m, noise))
         near_sum, near_count, far_sum, far_count = 0.0, 0, 0.0, 0
         for j in range(measured):
             behind_m = sample_m[j] - anchor_m
