@@ -14,14 +14,12 @@ from numpy.typing import NDArray
 from config.perception import DepthNoise
 from hal.compiled import compiled
 from hal.types import Integers, Vector
+from vision.bodies.sizes import SAME_BODY_M, SAME_BODY_SIGMAS
 from vision.depth.cells import cell_at
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import BoolGrid, DepthGrid, FloatGrid
 
 _AROUND_M = 0.2  # cells within this distance belong to the fragment's body, which is about twice as wide
-# Gate on depth: the depth of a body, plus this many sigmas of the noise that grows with the squared depth.
-_AGREE_M = 0.3
-_AGREE_SIGMAS = 2.0
 
 
 class _Window(NamedTuple):
@@ -123,7 +121,7 @@ def _within_reach(
     per_cell: width of a cell at 1 m, as a share of _AROUND_M.
     """
     result, top, left = np.zeros(search_area.shape, np.bool_), window.top, window.left
-    nearest_m, agree_per_m = np.zeros(label.max() + 1), _AGREE_SIGMAS * noise.quadratic_per_m
+    nearest_m, agree_per_m = np.zeros(label.max() + 1), SAME_BODY_SIGMAS * noise.quadratic_per_m
     for k in range(len(window.end_m)):
         nearest_m[label[window.rows[k], window.columns[k]]] = window.end_m[k]
     for i in range(label.shape[0]):
@@ -132,5 +130,5 @@ def _within_reach(
                 there_m = nearest_m[label[i, j]]
                 off_m = abs(grid.depth_m[top + i, left + j] - there_m)
                 close = distance[i, j] * per_cell * there_m <= 1.0
-                result[top + i, left + j] = close and off_m <= _AGREE_M + agree_per_m * there_m * there_m
+                result[top + i, left + j] = close and off_m <= SAME_BODY_M + agree_per_m * there_m * there_m
     return result

@@ -13,6 +13,7 @@ from config.perception import DepthNoise
 from hal.compiled import compiled
 from hal.types import FloatArray, Pose
 from vision.bodies.births import MIN_CELLS
+from vision.bodies.sizes import SAME_BODY_M, SAME_BODY_SIGMAS
 from vision.bodies.tracks import Tracks
 from vision.depth.depth_noise import depth_sigma_of
 from vision.detection import Detection
@@ -22,10 +23,8 @@ _FEW_FRAGMENTS = 4  # fewer are too few: a verdict along the line of sight takes
 _ENOUGH_OF_A_MOVER = 2  # enough to follow a mover, together with its surface
 _REACH_M = 9.0  # maximum distance: the depth mask's 10 m less about the noise of depth there
 _URGENT_SIGHTINGS = 45  # bodies seen in fewer frames, and suspects, are urgent
-# Gate on depth around the centre of the body: the sum of the depth of a body, of two sigmas of noise (95 %),
-# and of half of its measured extent in depth, which counts up to 1 m: more is noise or a wall.
-_GATE_M = 0.3
-_GATE_SIGMAS = 2.0
+# The gate on depth around the centre of a body also has half of its measured extent in depth, which counts up
+# to this: more is noise or a wall.
 _DEEPEST_M = 1.0
 
 
@@ -53,7 +52,7 @@ def _needing_fragments(
         if not x * x + y * y + z * z <= _REACH_M**2:
             continue
         depth = max(x * camera.rotation[0, 2] + y * camera.rotation[1, 2] + z * camera.rotation[2, 2], 0.0)
-        gate = _GATE_M + _GATE_SIGMAS * depth_sigma_of(depth, noise)
+        gate = SAME_BODY_M + SAME_BODY_SIGMAS * depth_sigma_of(depth, noise)
         gate += 0.5 * np.minimum(tracks.extent_m[n, 2], _DEEPEST_M)
         chosen[count], depth_m[count], gate_m[count] = n, depth, gate
         urgent[count] = tracks.evidence[n] > 0.0 or tracks.sightings[n] < _URGENT_SIGHTINGS

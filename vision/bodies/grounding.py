@@ -12,14 +12,12 @@ from numpy.typing import NDArray
 
 from config.perception import DepthNoise
 from hal.compiled import compiled
+from vision.bodies.sizes import SAME_BODY_M, SAME_BODY_SIGMAS
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import DepthGrid
 from vision.depth.regions import Regions, exchanged, measure
 from vision.numerics.order import median_of
 
-# Gate on depth: the depth of a body, plus this many sigmas of the noise that grows with the squared depth.
-_SAME_M = 0.3
-_SAME_SIGMAS = 2.0
 _MIN_GAIN_M = 0.2  # minimum gain in height: less is only the rim of the cells that were found already
 _LOWEST = 4  # the lowest quarter of a mover's rows gives the depth at which it reaches down
 
@@ -76,7 +74,7 @@ def _below(
         return taken[:0]
     lowest_rows = slice(bottom - (bottom - top + 1) // _LOWEST, bottom + 1)
     own_m = median_of(depth_m[lowest_rows].ravel()[labels[lowest_rows].ravel() == label])
-    same_m = np.float32(_SAME_M + _SAME_SIGMAS * noise.quadratic_per_m * own_m * own_m)
+    same_m = np.float32(SAME_BODY_M + SAME_BODY_SIGMAS * noise.quadratic_per_m * own_m * own_m)
     count, lowest = 0, 0
     for j in range(width):
         for i in range(foot[j] + 1, height):

@@ -23,6 +23,7 @@ from vision.bodies.tracks import Tracks
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import DepthGrid
 from vision.depth.rims import NO_RIM, FreeRims, free_rims
+from vision.motion.line_of_sight import FLOOR_SIGMA_MPS
 from vision.numerics import kalman
 from vision.numerics.relative_pose import NEAREST_M, Rows, coordinate_m, relative_rows
 
@@ -39,7 +40,6 @@ _QUANTUM = 0.29  # cells, sigma of a uniform distribution over one: all rows of 
 # of another renderer, 0.9 m/s in the mean, the error is 0.08 m/s in the median and 0.24 m/s at the 90th
 # percentile.
 _GAIT, _STEP_S = 0.15, 0.5
-_FLOOR_SIGMA_MPS = 0.03  # added sigma: error of the camera's own motion, as in vision/motion/line_of_sight.py
 
 
 class RimVelocities(NamedTuple):
@@ -59,7 +59,7 @@ class RimVelocities(NamedTuple):
     @property
     def sigmas(self) -> FloatArray:
         """(T,) how many standard deviations mps is from zero; 0 where nothing is measured."""
-        result: FloatArray = np.abs(self.mps) / np.hypot(self.sigma_mps, _FLOOR_SIGMA_MPS)
+        result: FloatArray = np.abs(self.mps) / np.hypot(self.sigma_mps, FLOOR_SIGMA_MPS)
         return result
 
 

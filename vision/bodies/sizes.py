@@ -4,6 +4,8 @@ How wide one person is decides what is cut out of a track, what is joined and wh
 """
 
 SINGLE_WIDTH_M = 0.85  # no single person is wider
+# Gate on depth for what may be of one body: its depth, plus this many sigmas of the noise of depth.
+SAME_BODY_M, SAME_BODY_SIGMAS = 0.3, 2.0
 NEARER_INVERSE = 0.02  # 1/m: something is in front of a body if its inverse depth is larger by this
 # A group of cells is seen through another one if this share of it is within the other's box.
 SEEN_THROUGH_SHARE = 0.9

@@ -35,15 +35,13 @@ def free_space(
     that missing data there is no hole; 0.0: all floor can be measured. Without a known mounting, space is
     known up to the nearest surface only. Floor that own parts hide (own_cells.py) is as floor below the view.
     """
-    bands, blind_m = level_bands(grid), 0.0
+    bands = level_bands(grid)
     nearest = _nearest_m(grid.forward_m, obstacle, bands.band, len(bands))
+    known, blind_m = np.zeros(len(bands)), 0.0
     if math.isfinite(grid.pitch_rad):
         known, blind_m = _known_m(grid, bands, max_depth_m, measurable_from_m)
-        # A surface hides everything behind it.
-        known = np.where(np.isfinite(nearest), nearest, known)
-    else:
-        known = np.where(np.isfinite(nearest), nearest, 0.0)
-    known = np.minimum(known, max_depth_m)
+    # A surface hides everything behind it.
+    known = np.minimum(np.where(np.isfinite(nearest), nearest, known), max_depth_m)
     return FreeSpace(
         bearing_tan=bands.bearing_tan,
         half_width_tan=bands.half_width_tan,

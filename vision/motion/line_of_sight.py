@@ -15,11 +15,11 @@ import numpy as np
 from hal.compiled import compiled, inlined
 from hal.types import Flags, FloatArray, Matrices, Matrix
 
-_FLOOR_SIGMA_MPS = 0.03  # added sigma: error of the camera's own motion, which no filter models
+FLOOR_SIGMA_MPS = 0.03  # added sigma: error of the camera's own motion, which no filter models
 _CONTRADICTION_SIGMAS = 2.5  # 99 % of equal velocities differ by less
 CONFIRMING_SIGMAS = 2.5  # as clear as a contradiction has to be
 _MIN_LEVEL = 1e-6  # lower bound of a length: in a vertical line of sight no direction is level
-_FLOOR = _FLOOR_SIGMA_MPS**2
+_FLOOR = FLOOR_SIGMA_MPS**2
 _AXES = 3
 _NOWHERE = np.zeros(3)
 
