@@ -75,13 +75,7 @@ def measure(grid: DepthGrid, labels: IntGrid, count: int) -> Regions:
     what hides a part.
     """
     up, height_m = (np.zeros(3), np.nan) if grid.up is None else (grid.up, grid.camera_height_m)
-    cells, rows, bbox_px, position_m, extent_m, sides_visible, top_and_bottom_visible = _measured(
-        grid, labels, count, up, height_m
-    )
-    overlapped = np.zeros(count, np.bool_)
-    return Regions(
-        cells, rows, bbox_px, position_m, extent_m, sides_visible, top_and_bottom_visible, overlapped
-    )
+    return Regions(*_measured(grid, labels, count, up, height_m), overlapped=np.zeros(count, np.bool_))
 
 
 @inlined

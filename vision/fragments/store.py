@@ -6,7 +6,8 @@ ago, at most a window of time.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +39,26 @@ class AnchorEnds:
     lag_s: Vector
 
 
+@dataclass(slots=True, eq=False)
+class _History:
+    """The last frames, in a ring buffer. Each fragment has a place in it, of P.
+
+    ends: direction (3), depth, far depth and depth_samples of each end, (HISTORY, P, 2, 6).
+    origins: of the camera in the fixed frame, (HISTORY, 3).
+    stamps_ns: when the frames were taken, (HISTORY,).
+    head: index of the last frame.
+    comparable: how many frames the next one can be compared with.
+    """
+
+    ends: Annotated[FloatArray, "float64[:, :, :, ::1]"] = field(
+        default_factory=lambda: np.full((HISTORY, _FEWEST_PLACES, 2, 6), np.nan)
+    )
+    origins: Matrix = field(default_factory=lambda: np.zeros((HISTORY, 3)))
+    stamps_ns: Integers = field(default_factory=lambda: np.zeros(HISTORY, np.int64))
+    head: int = -1
+    comparable: int = 0
+
+
 class FragmentStore:
     """Holds the fragments and their history. Only the detector changes it.
 
@@ -51,16 +72,16 @@ class FragmentStore:
     body_only: found on a body that may move (vision/fragments/attention.py), so not used for the camera's
         motion, (N,).
 
-    The history is a ring buffer of frames. Each fragment keeps its place in it for life, so that nothing has
-    to be moved when fragments are lost or found.
+    Each fragment keeps its place in the history for life, so that nothing has to be moved when fragments are
+    lost or found.
     """
 
     def __init__(self) -> None:
+        self._next_id = 0
         self.clear()
 
     def clear(self) -> None:
         """Forget everything but the next id: an id is never used twice."""
-        self._next_id = getattr(self, "_next_id", 0)
         self.ids = np.empty(0, np.int64)
         self.ends_px = np.empty((0, 2, 2), np.float32)
         self.near_m = np.empty((0, 2), np.float32)
@@ -71,13 +92,8 @@ class FragmentStore:
         self.pixel_cov = np.empty((0, 2, 3), np.float32)
         self.error_px = np.empty((0, 2), np.float32)
         self.body_only = np.empty(0, np.bool_)
-        # [frame, place, end]: direction (3), depth, far depth, depth_samples.
-        self._history = np.full((HISTORY, _FEWEST_PLACES, 2, 6), np.nan)
         self._place = np.empty(0, np.intp)
-        self._stamps_ns = np.zeros(HISTORY, np.int64)
-        self._origins = np.zeros((HISTORY, 3))
-        self._comparable = 0
-        self._head = -1
+        self._history = _History()
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -119,14 +135,15 @@ class FragmentStore:
 
     def _free_places(self, count: int) -> NDArray[np.intp]:
         """Free places in the history; it grows if there are too few."""
-        free = np.ones(self._history.shape[1], np.bool_)
+        history = self._history
+        free = np.ones(history.ends.shape[1], np.bool_)
         free[self._place] = False
         places = free.nonzero()[0]
         missing = count - len(places)
         if missing > 0:
             more = max(missing, len(free))
             room = np.full((HISTORY, more, 2, 6), np.nan)
-            self._history = np.concatenate((self._history, room), axis=1)
+            history.ends = np.concatenate((history.ends, room), axis=1)
             places = np.concatenate((places, np.arange(len(free), len(free) + more)))
         return places[:count]
 
@@ -135,15 +152,16 @@ class FragmentStore:
 
         sweep_rad (2,): see straight_rays.
         """
-        self._head = (self._head + 1) % HISTORY
-        self._comparable = min(self._comparable + 1, HISTORY)
+        history = self._history
+        history.head = (history.head + 1) % HISTORY
+        history.comparable = min(history.comparable + 1, HISTORY)
         direction = pose.rotation @ straight_rays(self.ends_px.reshape(-1, 2), camera, sweep_rad).T
         ends = np.empty((len(self), 2, 6))
         ends[..., :3] = direction.T.reshape(-1, 2, 3)
         ends[..., 3], ends[..., 4], ends[..., 5] = self.depth_m, self.far_m, self.depth_samples
-        self._history[self._head, self._place] = ends
-        self._stamps_ns[self._head] = stamp_ns
-        self._origins[self._head] = pose.translation_m
+        history.ends[history.head, self._place] = ends
+        history.stamps_ns[history.head] = stamp_ns
+        history.origins[history.head] = pose.translation_m
         self.age_frames += 1
 
     def break_history(self) -> None:
@@ -151,7 +169,7 @@ class FragmentStore:
 
         So it is not known either how far the ends are from where they should be expected.
         """
-        self._comparable = 0
+        self._history.comparable = 0
         self.error_px = np.full_like(self.error_px, np.inf)
 
     def anchors(self, now_ns: int, window_s: float) -> AnchorEnds:
@@ -159,7 +177,7 @@ class FragmentStore:
 
         Call between optical flow and commit: the history then ends with the frame before.
         """
-        return self._look_back(now_ns, self._comparable, window_s)
+        return self._look_back(now_ns, self._history.comparable, window_s)
 
     def last_entries(self, now_ns: int) -> AnchorEnds:
         """The last entry of each fragment: that of the frame before."""
@@ -168,15 +186,7 @@ class FragmentStore:
     def _look_back(self, now_ns: int, max_frames: int, window_s: float) -> AnchorEnds:
         """As anchors, looking back by max_frames at most."""
         ends, origin, lag, lag_s = _sights(
-            self._history,
-            self._origins,
-            self._stamps_ns,
-            self._head,
-            self._place,
-            self.age_frames,
-            now_ns,
-            max_frames,
-            window_s,
+            self._history, self._place, self.age_frames, now_ns, max_frames, window_s
         )
         return AnchorEnds(
             direction=ends[:3],
@@ -189,14 +199,9 @@ class FragmentStore:
         )
 
 
-@compiled(
-    "float64[:, :, :, ::1], float64[:, ::1], int64[::1], int64, int64[::1], int64[::1], int64, int64, float64"
-)
+@compiled(_History, "int64[::1], int64[::1], int64, int64, float64")
 def _sights(
-    history: FloatArray,
-    origins: FloatArray,
-    stamps_ns: NDArray[np.int64],
-    head: int,
+    history: _History,
     place: NDArray[np.intp],
     age_frames: NDArray[np.intp],
     now_ns: int,
@@ -206,9 +211,9 @@ def _sights(
     """The oldest entry of each fragment within window_s, or else the last one.
 
     Returns the ends (6, 2N), the camera's position then (3, 2N), and the age in frames and seconds, (N,)
-    each. head: the last frame in the ring buffers history, origins and stamps_ns.
+    each.
     """
-    within = 0
+    stamps_ns, head, within = history.stamps_ns, history.head, 0
     for back in range(max_frames):
         if (now_ns - stamps_ns[(head - back) % HISTORY]) * 1e-9 <= window_s:
             within += 1
@@ -221,7 +226,7 @@ def _sights(
         lag_frames[n], lag_s[n] = lag, (now_ns - stamps_ns[frame]) * 1e-9
         for column in range(2 * n, 2 * n + 2):
             for k in range(6):
-                ends[k, column] = history[frame, place[n], column - 2 * n, k]
+                ends[k, column] = history.ends[frame, place[n], column - 2 * n, k]
             for k in range(3):
-                origin[k, column] = origins[frame, k]
+                origin[k, column] = history.origins[frame, k]
     return ends, origin, lag_frames, lag_s
