@@ -52,12 +52,12 @@ class Corridor:
         self.straight = not (bend > 1e-6).any()
 
     def half_width(self, s_m: FloatArray) -> FloatArray:
-        """Half of the swept width at s_m, in metres; in bends that of the outer corner, on both sides."""
-        return _half_widths(s_m.reshape(-1), self.half_widths_m, self.overhang_m).reshape(s_m.shape)
+        """(P,) half of the swept width at s_m (P,); in bends that of the outer corner, on both sides."""
+        return _half_widths(self, s_m)
 
     def half_width_at(self, s_m: float) -> float:
         """Half of the swept width at a single s_m."""
-        return _one_half_width(s_m, self.half_widths_m, self.overhang_m)
+        return _one_half_width(self, s_m)
 
     def locate(self, points_m: FloatArray, from_s_m: float, to_s_m: float) -> FloatArray:
         """(3, P) path coordinates s_m and d_m of points (P, 2), and half of the swept width there.
@@ -98,24 +98,25 @@ def place(bodies: Bodies, corridor: Corridor, times_s: FloatArray, near_s_m: flo
 
 
 @inlined
-def _half_width(s_m: float, half_widths_m: FloatArray, overhang_m: float) -> float:
-    """Half of the swept width at s_m, interpolated; half_widths_m and overhang_m as in Corridor."""
+def _half_width(corridor: Corridor, s_m: float) -> float:
+    """Half of the swept width at s_m, interpolated."""
+    half_widths_m = corridor.half_widths_m
     # max(0.0, ...) in this order gives 0.0 for NaN; max(..., 0.0) would give NaN.
-    place = min(max(0.0, (s_m + overhang_m) / _STEP_M), len(half_widths_m) - 1.0)
+    place = min(max(0.0, (s_m + corridor.overhang_m) / _STEP_M), len(half_widths_m) - 1.0)
     k = min(int(place), len(half_widths_m) - 2)
     return float(half_widths_m[k] + (place - k) * (half_widths_m[k + 1] - half_widths_m[k]))
 
 
-@compiled("float64, float64[::1], float64")
-def _one_half_width(s_m: float, half_widths_m: FloatArray, overhang_m: float) -> float:
-    return _half_width(s_m, half_widths_m, overhang_m)
+@compiled(Corridor, "float64")
+def _one_half_width(corridor: Corridor, s_m: float) -> float:
+    return _half_width(corridor, s_m)
 
 
-@compiled("float64[:], float64[::1], float64")
-def _half_widths(s_m: FloatArray, half_widths_m: FloatArray, overhang_m: float) -> FloatArray:
+@compiled(Corridor, "float64[:]")
+def _half_widths(corridor: Corridor, s_m: FloatArray) -> FloatArray:
     half_width = np.empty(len(s_m))
     for k in range(len(s_m)):
-        half_width[k] = _half_width(s_m[k], half_widths_m, overhang_m)
+        half_width[k] = _half_width(corridor, s_m[k])
     return half_width
 
 
@@ -128,7 +129,7 @@ def _points_along(
     found = located(path, points_m, np.zeros(points_m.shape), np.zeros(1), from_s_m, to_s_m)
     points[:2] = found[:2, :, 0]
     for k in range(len(points_m)):
-        points[2, k] = _half_width(points[0, k], corridor.half_widths_m, corridor.overhang_m)
+        points[2, k] = _half_width(corridor, points[0, k])
     return points
 
 
@@ -156,7 +157,7 @@ def _placed(
             block_from[k, j] = s_m[k, j] - half_s[k, j] - corridor.front_m
             block_to[k, j] = s_m[k, j] + half_s[k, j] + corridor.rear_m
             beside = abs(d_m[k, j]) - (sin * along + cos * across)
-            clearance[k, j] = beside - _half_width(s_m[k, j], corridor.half_widths_m, corridor.overhang_m)
+            clearance[k, j] = beside - _half_width(corridor, s_m[k, j])
     return placed
 
 

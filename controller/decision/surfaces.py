@@ -93,18 +93,6 @@ def floor_points(pose: PlanarPose, ahead_m: FloatArray, left_m: FloatArray) -> F
     return points
 
 
-def bands_at(
-    free: FreeSpace, pose: PlanarPose, mount: CameraMount, x_m: FloatArray, y_m: FloatArray
-) -> tuple[FloatArray, NDArray[np.intp]]:
-    """Where floor points x_m (...), y_m (...) lie in the scan.
-
-    Returns the distance ahead of the camera in metres, and the band, (...) each. A band number outside of
-    0..B - 1 is beside the view. Behind the camera the number has no meaning.
-    """
-    forward, band = _bands_at(free, pose, mount, x_m.reshape(-1), y_m.reshape(-1))
-    return forward.reshape(x_m.shape), band.reshape(x_m.shape)
-
-
 @inlined
 def _eye(pose: PlanarPose, mount: CameraMount) -> Eye:
     """The camera of a robot at pose."""
@@ -185,10 +173,14 @@ def _band_at(free: FreeSpace, eye: Eye, x_m: float, y_m: float) -> tuple[float, 
 
 
 @compiled(FreeSpace, PlanarPose, CameraMount, "float64[:], float64[:]")
-def _bands_at(
+def bands_at(
     free: FreeSpace, pose: PlanarPose, mount: CameraMount, x_m: FloatArray, y_m: FloatArray
 ) -> tuple[FloatArray, NDArray[np.intp]]:
-    """As bands_at(), for points (P,)."""
+    """Where floor points x_m (P,), y_m (P,) lie in the scan.
+
+    Returns the distance ahead of the camera in metres, and the band, (P,) each. A band number outside of
+    0..B - 1 is beside the view. Behind the camera the number has no meaning.
+    """
     eye, forward, band = _eye(pose, mount), np.empty(len(x_m)), np.empty(len(x_m), np.intp)
     for k in range(len(x_m)):
         forward[k], band[k] = _band_at(free, eye, x_m[k], y_m[k])

@@ -71,7 +71,7 @@ def test_a_body_beside_a_bend_is_turned_against_the_path() -> None:
     placed = place(box(4.0, 4.0, half_view_m=0.1, half_across_m=0.6), corridor, np.zeros(1), 3.0, 12.0)
     assert placed.s_m[0, 0] == pytest.approx(2.0 * math.pi)
     assert placed.half_s_m[0, 0] == pytest.approx(0.6, abs=1e-6)
-    assert placed.clearance_m[0, 0] == pytest.approx(-0.1 - corridor.half_width(placed.s_m)[0, 0], abs=1e-6)
+    assert placed.clearance_m[0, 0] == pytest.approx(-0.1 - corridor.half_width(placed.s_m[0])[0], abs=1e-6)
 
 
 def test_velocity_along_and_across_the_path() -> None:
