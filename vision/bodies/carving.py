@@ -40,6 +40,7 @@ from vision.depth.regions import Regions
 from vision.detection import Detection
 from vision.motion import moving_fragments
 from vision.motion.least_squares import FragmentVelocities
+from vision.motion.velocities import EndResiduals
 from vision.numerics.order import median
 from vision.scene import IMPLAUSIBLE_SPEED_FACTOR
 
@@ -172,22 +173,15 @@ def _around_moving_fragments(
     (_believable_alone).
     """
     result = np.zeros(detection.grid.depth_m.shape, np.bool_)
-    motion = detection.motion
     if len(chosen) == 0:
         return result
-    position, velocity, covariance = _of_chosen(
-        motion.static_m, velocities.velocity_mps, velocities.covariance, chosen
-    )
+    position, velocity, covariance = _of_chosen(detection.motion, velocities, chosen)
     sigma = depth_sigma_m(position[:, 2], config.depth_noise)
     group = moving_fragments.cluster(position, velocity, covariance, sigma)
     company = np.bincount(group)[group] >= _MIN_FRAGMENTS
     seen_s = detection.age_frames.take(chosen).astype(float) * detection.dt_s
-    chosen = chosen[
-        company
-        | _believable_alone(
-            seen_s, velocity, covariance, IMPLAUSIBLE_SPEED_FACTOR * config.motion.max_speed_mps
-        )
-    ]
+    most_mps = IMPLAUSIBLE_SPEED_FACTOR * config.motion.max_speed_mps
+    chosen = chosen[company | _believable_alone(seen_s, velocity, covariance, most_mps)]
     if len(chosen) == 0:
         return result
     return near_ends(
@@ -200,20 +194,21 @@ def _around_moving_fragments(
     )
 
 
-@compiled("float64[:, :], float64[:, :], float64[:, :, :], int64[::1]")
+@compiled(EndResiduals, FragmentVelocities, "int64[::1]")
 def _of_chosen(
-    static_m: FloatArray, velocity_mps: FloatArray, covariance: FloatArray, chosen: NDArray[np.intp]
+    motion: EndResiduals, velocities: FragmentVelocities, chosen: NDArray[np.intp]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Position (K, 3), velocity (K, 3) and its covariance (K, 3, 3) of fragments chosen (K,).
 
-    The position is the middle of the two ends in static_m (2N, 3).
+    The position is the middle of the two ends, where they would be if they were static.
     """
+    static_m = motion.static_m
     position, velocity = np.empty((len(chosen), 3)), np.empty((len(chosen), 3))
     spread = np.empty((len(chosen), 3, 3))
     for k in range(len(chosen)):
         n = chosen[k]
         position[k] = 0.5 * (static_m[2 * n] + static_m[2 * n + 1])
-        velocity[k], spread[k] = velocity_mps[n], covariance[n]
+        velocity[k], spread[k] = velocities.velocity_mps[n], velocities.covariance[n]
     return position, velocity, spread
 
 
