@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hal.types import FloatArray, Intrinsics, Pose
+from hal.types import FloatArray, Integers, Intrinsics, Pose
 from vision.depth.depth_grid import DepthGrid
 from vision.ego_motion.camera_motion import MIN_AGREEMENT, CameraEstimate
 from vision.ego_motion.motion_prior import MotionPrior
@@ -76,10 +77,10 @@ class Detection:
     dt_s: float
     camera: Intrinsics
     grid: DepthGrid
-    ids: NDArray[np.int64]
-    ends_px: NDArray[np.float32]
-    near_m: NDArray[np.float32]
-    age_frames: NDArray[np.intp]
+    ids: Integers
+    ends_px: Annotated[NDArray[np.float32], "float32[:, :, :]"]
+    near_m: Annotated[NDArray[np.float32], "float32[:, :]"]
+    age_frames: Integers
     motion: EndResiduals
     pose: Pose
     ego_motion: EgoMotion

@@ -60,29 +60,13 @@ def adopt(
     if len(tracks) == 0 or len(owner) == 0:
         return np.full(len(owner), -1, np.int64)
     age_s: FloatArray = np.multiply(detection.age_frames, detection.dt_s, dtype=np.float64)
-    return _adopted(
-        detection.ends_px,
-        detection.near_m,
-        detection.grid,
-        labels,
-        tracks,
-        long_static(detection.motion, age_s),
-        owner,
-        noise,
-    )
+    is_long_static = long_static(detection.motion, age_s)
+    return _adopted(detection, detection.grid, labels, tracks, is_long_static, owner, noise)
 
 
-@compiled(
-    "float32[:, :, :], float32[:, :]",
-    DepthGrid,
-    "int32[:, ::1]",
-    Tracks,
-    "boolean[:], int64[::1]",
-    DepthNoise,
-)
+@compiled(Detection, DepthGrid, "int32[:, ::1]", Tracks, "boolean[:], int64[::1]", DepthNoise)
 def _adopted(
-    ends_px: NDArray[np.float32],
-    near_m: NDArray[np.float32],
+    detection: Detection,
     grid: DepthGrid,
     labels: IntGrid,
     tracks: Tracks,
@@ -91,6 +75,7 @@ def _adopted(
     noise: DepthNoise,
 ) -> NDArray[np.int64]:
     """As adopt. is_long_static (N,): fragments that have been static for a while."""
+    ends_px, near_m = detection.ends_px, detection.near_m
     result = np.full(len(ends_px), -1, np.int64)
     for k in range(len(ends_px)):
         own_m = float(np.fmin(near_m[k, 0], near_m[k, 1]))

@@ -169,7 +169,7 @@ def fragments(
 ) -> Fragments:
     """The Fragments of the Percept. owner (N,): ids of their tracks. moving (N,): whether these move."""
     depth, position, velocity, sigma = _of_fragments(
-        detection.ends_px, detection.near_m, detection.motion, velocities, detection.camera
+        detection, detection.motion, velocities, detection.camera
     )
     return Fragments(
         ids=detection.ids,
@@ -183,19 +183,15 @@ def fragments(
     )
 
 
-@compiled("float32[:, :, :], float32[:, :]", EndResiduals, FragmentVelocities, Intrinsics)
+@compiled(Detection, EndResiduals, FragmentVelocities, Intrinsics)
 def _of_fragments(
-    ends_px: NDArray[np.float32],
-    near_m: NDArray[np.float32],
-    motion: EndResiduals,
-    velocities: FragmentVelocities,
-    camera: Intrinsics,
+    detection: Detection, motion: EndResiduals, velocities: FragmentVelocities, camera: Intrinsics
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Depth (N,) and position (N, 3) of the fragments' middles; velocity (N, 3) and its sigma (N, 3).
 
     Velocity and sigma are NaN where neither of the two ends is usable.
     """
-    count = len(ends_px)
+    ends_px, near_m, count = detection.ends_px, detection.near_m, len(detection.ends_px)
     depth, position = np.empty(count), np.empty((count, 3))
     velocity, sigma = np.full((count, 3), np.nan), np.full((count, 3), np.nan)
     for k in range(count):
