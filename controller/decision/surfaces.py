@@ -80,7 +80,10 @@ def check_scan(free: FreeSpace) -> None:
 def surfaces_of(
     free: FreeSpace, pose: PlanarPose, mount: CameraMount, noise: DepthNoise = TYPICAL_DEPTH_NOISE
 ) -> Surfaces:
-    """The surfaces of free, seen by the camera of a robot at pose. noise: of its depth."""
+    """The surfaces of free, which check_scan() passes, seen by the camera of a robot at pose.
+
+    noise: of its depth.
+    """
     return Surfaces(*_surfaces(free, pose, mount), noise)
 
 
@@ -142,7 +145,7 @@ def _surfaces(
     free: FreeSpace, pose: PlanarPose, mount: CameraMount
 ) -> tuple[FloatArray, NDArray[np.intp], FloatArray, FloatArray, FloatArray]:
     """The fields of Surfaces, as surfaces_of()."""
-    bearing_tan, nearest_m, known_m = free.bearing_tan, free.nearest_m, free.known_m
+    bearing_tan, nearest_m = free.bearing_tan, free.nearest_m
     eye_x, eye_y, cos, sin = _eye(pose, mount)
     count, found = len(bearing_tan), 0
     seen, bands, forward = np.empty(count), np.empty(count, np.intp), np.empty(count)
@@ -150,11 +153,9 @@ def _surfaces(
     for b in range(count):
         z = nearest_m[b]
         if not math.isfinite(z):
-            seen[b] = known_m[b] if known_m[b] > 0.0 else 0.0
+            seen[b] = free.known_m[b]
             continue
         seen[b] = z
-        if not math.isfinite(bearing_tan[b]):
-            continue
         right = z * bearing_tan[b]
         points[found, 0], points[found, 1] = eye_x + z * cos + right * sin, eye_y + z * sin - right * cos
         bands[found], forward[found], half_band[found] = b, z, z * free.half_width_tan

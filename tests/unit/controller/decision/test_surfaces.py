@@ -42,8 +42,8 @@ def test_the_noise_is_that_of_the_camera() -> None:
 
 
 def test_a_band_was_seen_to_its_surface_or_over_free_floor_or_not_at_all() -> None:
-    seen = surfaces_of(ahead([3.0, math.inf, math.inf, math.inf], [2.5, 4.0, 0.0, math.nan]), HERE, MOUNT)
-    assert seen.seen_m.tolist() == [3.0, 4.0, 0.0, 0.0]
+    seen = surfaces_of(ahead([3.0, math.inf, math.inf], [2.5, 4.0, 0.0]), HERE, MOUNT)
+    assert seen.seen_m.tolist() == [3.0, 4.0, 0.0]
     assert seen.bands.tolist() == [0]
     np.testing.assert_allclose(seen.points_m, [[3.5, 0.0]])
 
