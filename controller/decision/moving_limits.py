@@ -36,8 +36,8 @@ from hal.types import FloatArray
 _SPEEDS = 31  # how many speeds are tried
 # Above this speed along the path a body drives ahead; above it in the other direction it is oncoming.
 _DRIVES_AHEAD_MPS = 0.1
-# Slowing down so as to arrive when the body leaves is worth it only above this speed; below it, stopping
-# before the body is as good.
+# Slowing down so as to arrive when a body leaves that has yet to come in is worth it only above this speed;
+# below it, stopping before the body is as good.
 _MIN_ARRIVAL_MPS = 0.3
 # Nor is it worth it if the body leaves later than this: most bodies change their velocity before, and the
 # robot can still stop.
@@ -191,7 +191,7 @@ class MovingLimits:
         choice = choices(conflict, ramps, s_m, margins.least_m, margins.crossing_s, enter_s)
         if conflict.in_s <= 0.0 or conflict.hi_in_m <= s_m:
             choice = Choice(choice.yield_mps, math.inf)
-        worth_mps = _MIN_ARRIVAL_MPS if conflict.out_s <= _MAX_FORESEEN_LEAVE_S else math.inf
+        worth_mps = _MIN_ARRIVAL_MPS if _is_foreseen(conflict) else math.inf
         if choice.yield_mps < min(stays.speed_mps, worth_mps):
             return _Offer(track_id, Choice(stays.speed_mps, choice.first_mps), stays)
 
@@ -230,3 +230,12 @@ class MovingLimits:
             else:
                 self._robot_passes_first.discard(one.track_id)
         return found, speed
+
+
+def _is_foreseen(conflict: Conflict) -> bool:
+    """Whether the robot slows down early for what a body will do, not only so that it can stop before it.
+
+    Of a body that is in the way already, only the time is known at which it has certainly left. It mostly
+    leaves sooner, and then the robot would have slowed down too much.
+    """
+    return conflict.in_s > 0.0 and conflict.out_s <= _MAX_FORESEEN_LEAVE_S

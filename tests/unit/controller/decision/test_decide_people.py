@@ -54,6 +54,17 @@ def test_body_that_leaves_slowly_is_approached_like_a_standing_one() -> None:
     assert decision.target_speed_mps > 1.0
 
 
+def test_who_is_in_the_way_is_approached_like_a_standing_one() -> None:
+    """To arrive as he has certainly left, 0.95 m/s would do; but he mostly leaves sooner."""
+    leaves = Bench().settle(obstacle(4.0, 0.3, vy_mps=-0.4, sigma_mps=0.05), v_mps=0.8)
+    stands = Bench().settle(obstacle(4.0, 0.3), v_mps=0.8)
+    assert leaves.reason.rule == "crossing"
+    assert leaves.target_speed_mps == pytest.approx(stands.target_speed_mps, abs=0.02)
+    comes = Bench().settle(obstacle(4.0, 1.5, vy_mps=-0.8, sigma_mps=0.05), v_mps=0.8)
+    assert "crosses" in comes.reason.sentence
+    assert comes.target_speed_mps < stands.target_speed_mps
+
+
 def test_the_robot_passes_first_when_there_is_time() -> None:
     decision = Bench().settle(obstacle(3.0, 4.5, vy_mps=-0.6), v_mps=1.5)
     assert decision.target_speed_mps == 1.5
