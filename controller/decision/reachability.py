@@ -131,16 +131,3 @@ def count_safe_stops(stopping: Stops, s_m: float, reached: Reach, counts: NDArra
                 if counts[k] and reached.inside[k, j] and blocks:
                     return i
     return len(stopping.moves)
-
-
-@compiled(Stops, Reach)
-def last_stop_before_entry(stopping: Stops, reached: Reach) -> int:
-    """Index of the last stop that ends before any body could be in the corridor at all; -1: none does."""
-    first = 0
-    for j in range(reached.inside.shape[1] - 1, -1, -1):
-        if reached.inside[:, j].any():
-            first = j
-    for i in range(len(stopping.moves) - 1, -1, -1):
-        if not stopping.moves[i, max(first - 1, 0)]:
-            return i
-    return -1

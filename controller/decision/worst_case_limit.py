@@ -30,7 +30,6 @@ from controller.decision.reachability import (
     Reach,
     Stops,
     count_safe_stops,
-    last_stop_before_entry,
     passes_clear,
     reach,
     stops,
@@ -124,16 +123,11 @@ class WorstCase:
     ) -> float:
         """The greatest safe speed; inf: no need to slow.
 
-        For confirmed bodies the stop begins _FORESIGHT_S later, but the limit is not lower than the greatest
-        speed whose immediate stop ends before any body could be in the way. For young bodies it begins
-        confirm_s later: they may be confirmed first while there is time. Bodies that do not enter the
-        corridor (not in enters) never limit the speed below beside_mps.
+        For confirmed bodies the stop begins _FORESIGHT_S later. For young bodies it begins confirm_s later:
+        they may be confirmed first while there is time. Bodies that do not enter the corridor (not in enters)
+        never limit the speed below beside_mps.
         """
         speed = self._greatest(self._stops_early, reached, ~young, s_m)
-        if math.isfinite(speed):
-            soon = last_stop_before_entry(self._stops_now, reached)
-            if soon >= 0:
-                speed = max(speed, float(self._speeds[soon]))
         if np.count_nonzero(young):
             speed = min(speed, self._greatest(self._stops_after_confirming, reached, young, s_m))
         beside_mps = self._config.prediction.beside_mps
@@ -157,7 +151,6 @@ class WorstCase:
         confirm_s = self._config.prediction.confirm_s
         self._stops_early = self._stops(self._speeds, 0.0, latency_s + _FORESIGHT_S)
         self._stops_after_confirming = self._stops(self._speeds, 0.0, latency_s + confirm_s)
-        self._stops_now = self._stops(self._speeds, 0.0, latency_s)
         # Which of the two waits is longer depends on the configuration.
         waits = self._stops_early, self._stops_after_confirming
         self._furthest_m = float(max(stop.distance_m.max() for stop in waits))

@@ -13,7 +13,6 @@ from controller.decision.manoeuvres import Manoeuvres
 from controller.decision.reachability import (
     Reach,
     count_safe_stops,
-    last_stop_before_entry,
     passes_clear,
     reach,
     stops,
@@ -176,5 +175,5 @@ def test_body_that_accelerates_along_the_path_extends_its_reach_on_one_side_only
 def test_a_stop_that_is_over_in_time_needs_no_room() -> None:
     """It could be in the way after 2 s at the earliest, right before the robot's nose."""
     near = reached(box(0.9, 0.65 + 1.0, 0.01, 0.0), manoeuvre_mps2=0.5)
-    assert last_stop_before_entry(stops(stop_from(1.0), TIMES), near) == 0
-    assert last_stop_before_entry(stops(stop_from(1.5), TIMES), near) == -1
+    assert count_safe_stops(stops(stop_from(1.0), TIMES), 0.0, near, np.array([True])) == 1
+    assert count_safe_stops(stops(stop_from(1.5), TIMES), 0.0, near, np.array([True])) == 0
