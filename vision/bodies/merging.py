@@ -34,6 +34,8 @@ _CLOSE_OVERLAPPING_M = 0.40  # where one is seen in front of the other
 _TOUCHING_M = 0.1  # where only noise separates the two
 _PIECES_M = 0.8  # between the edges of a vehicle's plain side, on which depth sees nothing
 _PARTED_M = 1.0  # between pieces one above the other: what hides the middle is not larger
+_FAR_END_M = 2.0  # between a vehicle's near side and its far end: the width of a van
+_FAR_END_PX = 32.0  # maximum width of what is seen of that end, which stereo matching widens by 8 to 10 px
 _SAME_DEPTH_M = 0.4  # maximum difference in depth of pieces one above the other, and of halves
 _HIDDEN_M = 1.3  # maximum gap between the halves of a vehicle: what hides its middle is not larger
 _HALVES_MPS = 0.6  # maximum difference of the halves' velocities
@@ -103,7 +105,8 @@ def pairs_to_merge(
     halves = _halves(pairs, regions, velocity_mps) & ~one
     if halves.any():
         halves &= nearer_between(grid, regions, small, large)
-    pieces = (_pieces(pairs, regions, velocity_mps) | _above(pairs, regions) | halves) & ~one
+    pieces = _pieces(pairs, regions, velocity_mps) | _far_end(pairs, regions, velocity_mps)
+    pieces = (pieces | _above(pairs, regions) | halves) & ~one
     if pieces.any():
         one |= pieces & ~farther_between(grid, regions, small, large)
     small, large = small[one], large[one]
@@ -197,6 +200,24 @@ def _pieces(pairs: _Pairs, regions: Regions, velocity_mps: FloatArray) -> BoolAr
     """
     moves = np.square(velocity_mps[pairs.large]).sum(axis=1) > _MIN_MOVING_MPS**2
     result: BoolArray = pairs.velocities_equal & moves & _wide(pairs, regions) & (pairs.gap_m <= _PIECES_M)
+    return result
+
+
+def _far_end(pairs: _Pairs, regions: Regions, velocity_mps: FloatArray) -> BoolArray:
+    """(K,) the far end of a vehicle wider than a person: a tiny strip, farther away, beside its near side.
+
+    The side in between is seen so aslant that depth shows no surface there. Beyond its end stereo matching
+    gives the end's depth to some pixels of the background. Their velocities do not contradict each other.
+    They are one body if nothing farther is seen between them.
+    """
+    small_px, large_px = pairs.small_px, pairs.large_px
+    strip = small_px[:, 2] - small_px[:, 0] <= _FAR_END_PX
+    strip &= (small_px[:, 1] >= large_px[:, 1]) & (small_px[:, 3] <= large_px[:, 3])
+    strip &= regions.cells[pairs.small] <= _TINY_SHARE * regions.cells[pairs.large]
+    strip &= regions.position_m[pairs.small, 2] > regions.position_m[pairs.large, 2]
+    vehicle = np.square(velocity_mps[pairs.large]).sum(axis=1) > _MIN_MOVING_MPS**2
+    vehicle &= regions.extent_m[pairs.large, 0] > SINGLE_WIDTH_M
+    result: BoolArray = pairs.velocities_compatible & strip & vehicle & (pairs.gap_m <= _FAR_END_M)
     return result
 
 
