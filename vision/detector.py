@@ -143,10 +143,15 @@ class Detector:
     def _learn_motion(self, found: CameraEstimate, prior: MotionPrior, dt_s: float) -> CameraMotion:
         """Take over the camera's new pose, and learn from its motion for the frames to come."""
         step = self._pose.inverse() @ found.pose
+        refuted = found.visual and self._memory.refutes(step, dt_s, prior.source)
+        if refuted:
+            found = replace(found, visual=False, disputed=True)
         self._read_out.learn(found, vector_from_rotation(step.rotation), dt_s)
         self._pose = found.pose
         camera = camera_motion_of(found, step, dt_s, prior)
         self._memory.learn(step, dt_s, camera.ego.source)
+        if refuted:
+            self._memory.begin_again()
         return camera
 
     def _track_ends(

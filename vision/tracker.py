@@ -119,6 +119,7 @@ class Tracker:
             self._free.remember(grid, pose, now_ns)
         labels, whole, measured = self._label(detection, above_floor, changes, velocities, elapsed_s)
         visible = occlusion.with_occlusion(grid, labels, measured)
+        keeps_area = sightings.keeps_area(tracks, visible.cells)
         sightings.update_from_surfaces(tracks, detection, visible, noise)
         rims = self._rims.velocities(grid, labels, tracks, pose, now_ns)
         nearing = approach.measure(tracks, detection, labels, self._free, noise)
@@ -133,7 +134,8 @@ class Tracker:
         if detection.dt_s > 0 and len(tracks):
             body = self._fuse_fragments(detection, owner, velocities)
             arrivals = masks.count_cells(whole, changes.arrived_cells, len(tracks))
-            self._judge(detection, FrameMeasures(body, rims, nearing, arrivals, measured.cells))
+            measures = FrameMeasures(body, rims, nearing, arrivals, measured.cells, keeps_area)
+            self._judge(detection, measures)
         self._surfaces = masks.surfaces(grid, labels, tracks.ids, pose)
         return owner
 

@@ -34,6 +34,8 @@ _CLOSE_OVERLAPPING_M = 0.40  # where one is seen in front of the other
 _TOUCHING_M = 0.1  # where only noise separates the two
 _PIECES_M = 0.8  # between the edges of a vehicle's plain side, on which depth sees nothing
 _PARTED_M = 1.0  # between pieces one above the other: what hides the middle is not larger
+_FAR_END_M = 2.0  # between a vehicle's near side and its far end: the width of a van
+_FAR_END_PX = 32.0  # maximum width of what is seen of that end, which stereo matching widens by 8 to 10 px
 _SAME_DEPTH_M = 0.4  # maximum difference in depth of pieces one above the other, and of halves
 _HIDDEN_M = 1.3  # maximum gap between the halves of a vehicle: what hides its middle is not larger
 _HALVES_MPS = 0.6  # maximum difference of the halves' velocities
@@ -58,6 +60,7 @@ class _Pairs:
     small_px, large_px: their boxes in the image, u0, v0, u1, v1, (K, 4).
     gap_m, stacked, within: see Relations.
     away_m: difference of their depths.
+    farther: the small one is farther away.
     overlapping: at least half of the small box is within the large one in the image.
     size_plausible: by their sizes they could be one body.
     tiny: the small one is, compared with the large one.
@@ -77,6 +80,7 @@ class _Pairs:
     stacked: BoolArray
     within: BoolArray
     away_m: FloatArray
+    farther: BoolArray
     overlapping: BoolArray
     size_plausible: BoolArray
     tiny: BoolArray
@@ -111,7 +115,7 @@ def pairs_to_merge(
     halves = _halves(pairs) & ~one
     if halves.any():
         halves &= nearer_between(grid, regions, small, large)
-    pieces = (_pieces(pairs) | _above(pairs) | halves) & ~one
+    pieces = (_pieces(pairs) | _far_end(pairs) | _above(pairs) | halves) & ~one
     if pieces.any():
         one |= pieces & ~farther_between(grid, regions, small, large)
     small, large = small[one], large[one]
@@ -147,6 +151,7 @@ def _paired(
     right_m = np.maximum(box.high_m[small, 0], box.high_m[large, 0])
     left_m = np.minimum(box.low_m[small, 0], box.low_m[large, 0])
     relation = relations(regions, small, large)
+    behind_m = regions.position_m[small, 2] - regions.position_m[large, 2]
     overlapping = relation.overlap >= _OVERLAP
     person_width = right_m - left_m <= SINGLE_WIDTH_M
     return _Pairs(
@@ -155,7 +160,8 @@ def _paired(
         gap_m=relation.gap_m,
         stacked=relation.stacked,
         within=relation.within,
-        away_m=np.abs(regions.position_m[small, 2] - regions.position_m[large, 2]),
+        away_m=np.abs(behind_m),
+        farther=behind_m > 0.0,
         overlapping=overlapping,
         size_plausible=(cells[small] <= _SMALL_SHARE * cells[large]) | person_width | overlapping,
         tiny=cells[small] <= _TINY_SHARE * cells[large],
@@ -204,6 +210,20 @@ def _pieces(pairs: _Pairs) -> BoolArray:
     sees only the edges.
     """
     return pairs.wide & pairs.moves & pairs.velocities_equal & (pairs.gap_m <= _PIECES_M)
+
+
+def _far_end(pairs: _Pairs) -> BoolArray:
+    """(K,) the far end of a vehicle wider than a person: a tiny strip, farther away, beside its near side.
+
+    The side in between is seen so aslant that depth shows no surface there. Beyond its end stereo matching
+    gives the end's depth to some pixels of the background. Their velocities do not contradict each other.
+    They are one body if nothing farther is seen between them.
+    """
+    small_px, large_px = pairs.small_px, pairs.large_px
+    strip = small_px[:, 2] - small_px[:, 0] <= _FAR_END_PX
+    strip &= (small_px[:, 1] >= large_px[:, 1]) & (small_px[:, 3] <= large_px[:, 3])
+    of_vehicle = pairs.tiny & pairs.farther & pairs.wide & pairs.moves
+    return strip & of_vehicle & pairs.velocities_compatible & (pairs.gap_m <= _FAR_END_M)
 
 
 def _halves(pairs: _Pairs) -> BoolArray:

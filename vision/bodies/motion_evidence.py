@@ -33,6 +33,7 @@ class FrameMeasures:
 
     fragments, rims, approach: their velocities by their fragments, free rims and depth.
     arrived, cells: number of newly arrived cells of each surface, and of all its cells, (T,).
+    keeps_area: the surface has about as many cells as when it was last seen, (T,).
     """
 
     fragments: BodyVelocities
@@ -40,6 +41,7 @@ class FrameMeasures:
     approach: ApproachSpeeds
     arrived: Integers
     cells: Integers
+    keeps_area: Flags
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,6 +60,7 @@ class MotionEvidence:
     restless_s: for how long the track has been restless.
     arrived, cells: of the surface.
     arriving_s: for how long part of the surface has been newly arrived.
+    keeps_area: the surface is about as large as when it was last seen.
     size_m: largest extent of the surface.
     velocity_measured_s: for how long the centre has measured the velocity without a break.
     rim_mps: speed across the line of sight by its free rims, 0 where they show none.
@@ -91,6 +94,7 @@ class MotionEvidence:
     arrived: Integers
     arriving_s: Vector
     cells: Integers
+    keeps_area: Flags
     size_m: Vector
     velocity_measured_s: Vector
     rim_mps: Vector
@@ -139,6 +143,7 @@ def evidence_of(
         arrived=measures.arrived,
         arriving_s=tracks.arriving_s,
         cells=measures.cells,
+        keeps_area=measures.keeps_area,
         size_m=tracks.extent_m.max(axis=1),
         velocity_measured_s=tracks.velocity_measured_s,
         rim_mps=rims.mps,

@@ -122,8 +122,8 @@ def _shown(seen: MotionEvidence, parts: Split, second: SecondOpinion, demands: _
         opinion=Opinion(
             denies_along=second.denies_along[t],
             denies_across=second.denies_across[t],
-            confirms_along=second.confirms_along[t] and cells >= EVEN_CELLS,
-            confirms_across=second.confirms_across[t],
+            confirms_along=second.confirms_along[t] and cells >= EVEN_CELLS and seen.keeps_area[t],
+            confirms_across=second.confirms_across[t] and seen.keeps_area[t],
         ),
         ends=_ends(seen, t, frame, demands.fastest_mps),
         surface=Surface(
@@ -134,7 +134,7 @@ def _shown(seen: MotionEvidence, parts: Split, second: SecondOpinion, demands: _
             depth_sigma_m=seen.depth_sigma_m[t],
         ),
         rim=Rim(
-            speed_mps=abs(seen.rim_mps[t]),
+            speed_mps=abs(seen.rim_mps[t]) if seen.keeps_area[t] else 0.0,
             sigmas=seen.rim_sigmas[t],
             shown_s=seen.rim_s[t],
             wander_mps=turning_mps,

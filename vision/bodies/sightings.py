@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from config.perception import DepthNoise
 from hal.compiled import compiled
-from hal.types import FloatArray, Intrinsics, Pose
+from hal.types import Flags, FloatArray, Integers, Intrinsics, Pose
 from vision.bodies.tracks import Tracks
 from vision.camera.lens import ray_through
 from vision.depth.connected import MIN_PART_CELLS
@@ -43,6 +43,9 @@ _CENTRE_NOISE = 0.2  # share of a pixel's depth noise: neighbours share it, so i
 _SAME_AREA = 0.3  # a relative change of area above this means that another part of the body is visible
 _AREA_MEMORY_S = 0.32  # time constant of the averaged area: a gain of 0.1 per frame at 30 frames a second
 _NEARLY_HIDDEN_SHARE = 0.4  # of the usual area: a mover with a smaller surface is nearly hidden
+# By such a factor areas change from frame to frame only where depth is wrong: what comes into view, or goes
+# behind something, changes more slowly.
+_JUMP_OF_AREA = 2.0
 _JUMP_M = 0.3  # plus two sigmas of depth: a centroid farther from its prediction than this has jumped
 # How a track is visible: with fewer cells than a part has; then the kinds of the module docstring, in order.
 _NOT_VISIBLE, _WHOLE, _PARTIAL, _POSITION_ONLY, _NEARLY_HIDDEN = range(5)
@@ -66,6 +69,17 @@ def update_from_surfaces(tracks: Tracks, detection: Detection, measured: Regions
     growth_mps = change * measured.extent_m[:, 0] / _AREA_MEMORY_S
     tracks.growth_mps = np.where(kind != _NOT_VISIBLE, growth_mps, tracks.growth_mps)
     _note_view(tracks, detection, measured, kind)
+
+
+def keeps_area(tracks: Tracks, cells: Integers) -> Flags:
+    """(T,) tracks whose surface, now of cells (T,), has neither doubled nor halved since it was last seen.
+
+    A wrong match of a repeated pattern comes and goes with noise, and its outline with it. Call before
+    update_from_surfaces.
+    """
+    before = tracks.cells
+    result: Flags = (before == 0) | ((cells <= _JUMP_OF_AREA * before) & (before <= _JUMP_OF_AREA * cells))
+    return result
 
 
 def forget_implausible(tracks: Tracks, fastest_mps: float, sigma_mps: float) -> None:

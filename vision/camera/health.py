@@ -203,8 +203,9 @@ def _motion_problem(ego: EgoMotion, blurred: bool, reckoned: bool) -> _Problem |
     if ego.source == "disputed":
         # By the kinematics of the base (rolling_prior of vision/ego_motion/motion_prior.py).
         return _POOR, (
-            "the images show a motion of the camera that a tracked base hardly makes, sideways or too sudden:"
-            " is the camera loose, does the base slide, or does everything in view move?"
+            "the images show a motion of the camera that a tracked base hardly makes,"
+            " sideways, backwards or too sudden: is the camera loose, does the base slide,"
+            " or does everything in view move?"
         )
     if ego.source == "odometry":
         return _POOR, "too few static fragments: the camera's motion rests on the odometry alone"

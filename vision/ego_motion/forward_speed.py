@@ -2,7 +2,8 @@
 
 The prior of the camera's motion (vision/ego_motion/motion_prior.py) rests on it. The images of one frame
 tell the speed to about 0.1 m/s. Where people who go ahead at the robot's own pace fill the view, they tell
-another speed for some frames, to which a tracked robot cannot change so fast.
+another speed for some frames, to which a tracked robot cannot change so fast. Nor does it go backwards: where
+the images say so, they have followed something that goes ahead.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from hal.types import CameraMount, FloatArray, Pose
 
 _FRAME_SIGMA_MPS = 0.1  # of the speed by the images of one frame
 _LEAST_SIGMA_MPS = 0.05  # of the prior: vibration
+_BACKWARDS_MPS = 0.05  # vibration again: more is no longer that of a robot that stands
 
 
 class ForwardSpeed(NamedTuple):
@@ -24,6 +26,11 @@ class ForwardSpeed(NamedTuple):
 
     mps: float
     sigma_mps: float
+
+    @property
+    def is_backwards(self) -> bool:
+        """Whether the robot would go backwards, which it never does."""
+        return self.mps < -_BACKWARDS_MPS
 
     def later_sigma_mps(self, dt_s: float, settings: EgoMotionSettings) -> float:
         """Standard deviation if mps is still the speed dt_s later."""
@@ -44,6 +51,7 @@ class ForwardSpeed(NamedTuple):
 
 
 UNKNOWN_SPEED = ForwardSpeed(0.0, math.inf)
+FORWARDS = ForwardSpeed(0.5, 0.5)  # no more is known than that the robot goes ahead, from 0 to 1 m/s
 
 
 def ahead(mount: CameraMount) -> FloatArray:

@@ -7,7 +7,7 @@ import numpy as np
 from config.perception import EgoMotionSettings
 from hal.types import CameraMount, FloatArray, Pose
 from vision.camera.lens import vector_from_rotation
-from vision.ego_motion.forward_speed import UNKNOWN_SPEED, down
+from vision.ego_motion.forward_speed import FORWARDS, UNKNOWN_SPEED, down
 from vision.ego_motion.motion_prior import MotionPrior, odometry_prior, rolling_prior, steady_prior, with_gyro
 
 _IDENTITY = Pose(np.eye(3), np.zeros(3))
@@ -49,6 +49,15 @@ class MotionMemory:
             return None
         return float(vector_from_rotation(self._last.rotation) @ down(mount)) / self._last_dt_s
 
+    def refutes(self, step: Pose, dt_s: float, source: str) -> bool:
+        """Whether step, which images without odometry tell of the last dt_s, takes a robot backwards.
+
+        Then something has been followed that goes ahead of the robot. source: of the prior, as in EgoMotion.
+        """
+        if self._mount is None or source != "none":
+            return False
+        return self._speed.seen(step, dt_s, self._mount, self._settings).is_backwards
+
     def learn(self, step: Pose, dt_s: float, source: str) -> None:
         """Note the motion of a frame, step, within dt_s. source: as in EgoMotion."""
         self._last, self._last_dt_s = step, dt_s if source != "none" else 0.0
@@ -62,6 +71,11 @@ class MotionMemory:
     def note_odometry(self, odometry: Pose | None) -> None:
         """Note the camera by dead reckoning in a frame that the next one will be compared with."""
         self._odometry = odometry
+
+    def begin_again(self) -> None:
+        """Forget a motion that was refuted: the robot goes ahead, at what speed is not known."""
+        self.forget()
+        self._speed = FORWARDS
 
     def forget(self) -> None:
         """Forget the motion, after a gap or a step back of time."""

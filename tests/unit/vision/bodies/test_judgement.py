@@ -116,6 +116,14 @@ def shared(velocity: Speed, **changes: Any) -> MotionEvidence:
     return by_fragments(velocity, 2, **{**both, **surface(velocity, 0.02), **changes})
 
 
+def test_a_surface_whose_area_jumps_confirms_nothing() -> None:
+    """As a wrong match of a wall of bricks, which comes and goes."""
+    jumps: dict[str, Any] = {"keeps_area": np.array([False])}
+    assert not rises(shared((0.0, 0.0, -0.4), **jumps))
+    assert not rises(shared((0.4, 0.0, 0.0), **jumps))
+    assert rises(by_fragments(ACROSS, 4, **jumps))  # fragments alone prove it as before
+
+
 def test_a_surface_of_a_few_cells_confirms_no_motion_along_the_line_of_sight() -> None:
     """They move along it together, with the depth noise that they share."""
     assert rises(shared((0.0, 0.0, -0.4), cells=np.array([48])))

@@ -41,6 +41,7 @@ def test_free_rims_that_go_one_way_long_enough_prove_motion() -> None:
     assert rises(by_rim(-0.8))
     assert not rises(by_rim(rim_s=0.1))
     assert not rises(by_rim(0.2))  # slower than 0.21 m/s
+    assert not rises(by_rim(keeps_area=np.array([False])))  # its outline jumps with its area
     assert not rises(by_rim(2.5))  # faster than anything
 
 

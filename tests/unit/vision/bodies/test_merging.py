@@ -162,6 +162,28 @@ def test_pieces_of_something_wide_with_nothing_seen_between_them_are_one() -> No
     assert merged(REAR, WHEEL, behind_m=0.0, velocity=[(0.29, 0.0, 0.0)] * 2) == []
 
 
+VAN = Body(-1.0, z=3.1, width=1.15, height=1.5, depth=0.4, cells=3300)
+FAR_END = Body(-0.4, z=5.0, width=0.4, height=1.0, depth=0.1, cells=50)  # 24 px wide, 1.65 m behind its side
+
+
+def test_far_end_of_a_vehicle_beside_its_near_side_belongs_to_it() -> None:
+    """Its side is seen aslant, and beyond its end stereo matching gives some background the end's depth."""
+    assert merged(VAN, FAR_END, behind_m=4.0) == [(1, 0)]  # the side, seen aslant
+    assert merged(VAN, FAR_END, behind_m=0.0, sigma=0.5) == [(1, 0)]  # nothing; and its velocity hardly known
+    assert merged(VAN, FAR_END, behind_m=6.0) == []  # the way behind is seen between them
+    assert merged(VAN, replace(FAR_END, width=0.6), behind_m=4.0) == []  # 36 px
+    assert merged(VAN, replace(FAR_END, cells=330), behind_m=4.0) == [(1, 0)]
+    assert merged(VAN, replace(FAR_END, cells=331), behind_m=4.0) == []  # somebody who comes out behind it
+    assert merged(VAN, replace(FAR_END, y=0.9), behind_m=4.0) == []  # lower than the vehicle reaches
+    assert merged(VAN, replace(FAR_END, y=-0.9), behind_m=4.0) == []
+    assert merged(VAN, replace(FAR_END, z=5.5), behind_m=4.0) == []  # 2.15 m behind
+    near = replace(FAR_END, x=-0.2, z=1.9, width=0.1, height=0.4)
+    assert merged(VAN, near, behind_m=0.0) == []  # in front of it
+    assert merged(replace(VAN, x=-0.8, width=0.8), FAR_END, behind_m=4.0) == []  # as narrow as a person
+    assert merged(VAN, FAR_END, velocity=[(0.8, 0.0, 0.0), (-0.8, 0.0, 0.0)], behind_m=4.0) == []
+    assert merged(VAN, FAR_END, velocity=[(0.29, 0.0, 0.0)] * 2, behind_m=4.0) == []  # as slow as what stands
+
+
 LOAD = Body(-0.8, width=1.0, height=1.2, cells=900)
 CAB = Body(1.1, z=4.2, width=0.8, height=1.5, cells=800)  # 1.0 m from the load
 NEARLY = [(0.8, 0.0, 0.0), (0.8, 0.0, 0.45)]

@@ -27,6 +27,14 @@ def seen_of(left_m: float, right_m: float, moving: bool = True) -> Tracks:
     return tracks
 
 
+def test_area_is_kept_if_it_neither_doubles_nor_halves() -> None:
+    tracks = Tracks()
+    tracks.start(np.zeros((6, 3)), 0.2, 1.5, 0.0, 0)
+    tracks.cells = np.array([100, 100, 100, 100, 0, 100])
+    cells = np.array([200, 201, 50, 49, 100, 0])  # the fifth has come out from behind something
+    assert sightings.keeps_area(tracks, cells).tolist() == [True, False, True, False, True, False]
+
+
 @pytest.mark.parametrize(("right_m", "nearly_hidden"), [(-0.2, True), (0.0, False)])
 def test_a_mover_of_which_less_than_two_fifths_are_left_to_see_is_a_sliver(
     right_m: float, nearly_hidden: bool

@@ -100,6 +100,19 @@ def test_motion_impossible_for_a_tracked_base_is_disputed_without_blaming_the_od
         assert "odometry" not in scene.health.reason
 
 
+def test_a_robot_that_seems_to_go_backwards_is_disputed_where_only_the_images_tell() -> None:
+    shown = noisy(record(room(), drive(-0.2), COUNT, QVGA))
+    eyes = perception()
+    scenes = [eyes.perceive(frame, None, None).scene for frame in shown.frames]
+    assert movers(scenes) == 0
+    disputed = [scene for scene in scenes if scene.ego_motion.source == "disputed"]
+    assert len(disputed) >= 5
+    assert {scene.health.condition for scene in disputed} == {CameraCondition.DEGRADED}
+    # With odometry it may: another planner drives it, or somebody pushes it.
+    backwards = [one.scene for one in look(shown, reckoned(drive(-0.2)))]
+    assert {scene.ego_motion.source for scene in backwards[1:]} == {"visual"}
+
+
 def test_after_a_jump_of_the_odometry_nothing_moves() -> None:
     def jumps(time_s: float) -> PlanarPose:
         return PlanarPose(0.5 * time_s + (0.2 if time_s > 0.5 else 0.0), 0.0, 0.0)

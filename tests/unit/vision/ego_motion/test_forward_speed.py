@@ -66,6 +66,27 @@ def test_after_a_gap_nothing_is_known() -> None:
     assert prior_mps(memory) == pytest.approx((0.0, SETTINGS.steady_speed_mps * SETTINGS.unknown_factor))
 
 
+def test_images_that_take_the_robot_backwards_are_refuted() -> None:
+    memory = MotionMemory(LEVEL, SETTINGS)
+    assert not memory.refutes(step(-0.049), DT_S, "none")  # at first they are taken as they are
+    assert memory.refutes(step(-0.051), DT_S, "none")
+    assert not memory.refutes(step(-0.051), DT_S, "odometry")
+    assert not MotionMemory(None, SETTINGS).refutes(step(-0.051), DT_S, "none")  # a hand goes any way
+    for _ in range(5):
+        memory.learn(step(0.0), DT_S, "visual")
+    assert not memory.refutes(step(-0.08), DT_S, "none")  # half of it may be an error of one frame
+    assert memory.refutes(step(-0.15), DT_S, "none")
+
+
+def test_after_a_refuted_motion_the_robot_may_go_ahead_at_any_speed() -> None:
+    memory = MotionMemory(LEVEL, SETTINGS)
+    memory.learn(step(0.0), DT_S, "visual")
+    memory.begin_again()
+    speed_mps, sigma_mps = prior_mps(memory)
+    assert speed_mps == pytest.approx(0.5)
+    assert sigma_mps == pytest.approx(np.hypot(0.5, 1.5 * DT_S))
+
+
 def test_a_camera_in_the_hand_goes_on_as_in_the_last_frame() -> None:
     memory = MotionMemory(None, SETTINGS)
     memory.learn(step(1.4), DT_S, "visual")
