@@ -64,7 +64,7 @@ class Prediction(Section):
         description="sideways acceleration of an obstacle that goes the robot's way: it may cut in unaware",
     )
     oncoming_mps2: float = Field(
-        default=0.15,
+        default=0.2,
         ge=0,
         le=5,
         description="sideways acceleration of an obstacle that has approached for a while: it sees the robot",
