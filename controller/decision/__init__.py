@@ -11,6 +11,7 @@ The files in the order of one control step:
 * known_places.py - which new tracks began where something had stood: no newcomers
 * velocity_filter.py - averages the measured velocities; how fast those who set off may become
 * cut_movers.py - how much nearer those may extend that come in over the edge of the view
+* turning_vehicles.py - how much nearer the ends of vehicles may swing that turn on the spot
 * out_of_view.py - keeps bodies that have left the view
 * unseen_motion.py - which of them move, and with which velocity
 * leftover_strips.py - which of them are only the last visible part of another one

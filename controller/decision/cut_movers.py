@@ -8,11 +8,10 @@ controller/decision/world_model.py asks once a scene.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 
-from controller.decision.bodies import Bodies
+from controller.decision.bodies import Bodies, extended_towards
 from controller.decision.view_edges import ViewEdges, ahead_and_left
 from hal.compiled import compiled
 from hal.directions import along_and_left
@@ -26,7 +25,7 @@ _INSIDE_M, _INSIDE_SHARE = 0.1, 0.1
 # It does not extend nearer to the robot's front than this: more than the robot drives between exposure and
 # decision, plus ALONGSIDE_M (controller/decision/limits.py). Else it would count as something that the front
 # has passed, and the robot would stop braking for it.
-_LEAST_AHEAD_M = 0.3
+LEAST_AHEAD_M = 0.3
 # What comes in slower than this, or rather along the view than across it, is seen in time.
 _MIN_INWARDS_MPS = 0.3
 
@@ -40,12 +39,10 @@ def with_hidden_near_sides(
     """
     if not np.count_nonzero(boxes.moving):
         return boxes
-    hidden_m = _hidden(boxes, pose, mount, edges, max(front_m - mount.forward_m + _LEAST_AHEAD_M, 0.0))
+    hidden_m = _hidden(boxes, pose, mount, edges, max(front_m - mount.forward_m + LEAST_AHEAD_M, 0.0))
     if not np.count_nonzero(hidden_m):
         return boxes
-    backwards = np.array([-math.cos(pose.heading_rad), -math.sin(pose.heading_rad)])
-    xy_m = boxes.xy_m + 0.5 * hidden_m[:, None] * backwards
-    return replace(boxes, xy_m=xy_m, half_view_m=boxes.half_view_m + 0.5 * hidden_m)
+    return extended_towards(boxes, hidden_m, pose.heading_rad)
 
 
 @compiled(Bodies, PlanarPose, CameraMount, ViewEdges, "float64")

@@ -2,7 +2,8 @@
 
 For each new scene, WorldModel turns the obstacles into boxes (controller/decision/obstacle_boxes.py),
 tells newcomers from tracks that were merely renumbered (controller/decision/known_places.py), averages their
-velocities (controller/decision/velocity_filter.py), adds bodies that have left the view
+velocities (controller/decision/velocity_filter.py), extends those that may be nearer than they are seen
+(controller/decision/cut_movers.py, turning_vehicles.py), adds bodies that have left the view
 (controller/decision/out_of_view.py), and notes free floor and unexplained surfaces along the path
 (controller/decision/sight.py). In each control step it says whether the camera can be relied on (the field
 fault). controller/decision/speed_limits.py turns what is known into speed limits.
@@ -30,6 +31,7 @@ from controller.decision.out_of_view import OutOfView
 from controller.decision.sight import Sight
 from controller.decision.situation import SceneError
 from controller.decision.surfaces import NO_SURFACES, check_scan, surfaces_of
+from controller.decision.turning_vehicles import TurningVehicles, with_swinging_ends
 from controller.decision.velocity_filter import SteadyVelocities
 from controller.decision.view_edges import ViewEdges
 from controller.path.path import OnPath, Path
@@ -92,6 +94,7 @@ class WorldModel:
         self._out_of_view = OutOfView(mount, robot.limits.max_obstacle_speed_mps)
         self.edges = ViewEdges(edge_tan=0.5, near_m=config.sight.near_m, up_tan=math.inf)
         self._known_places = KnownPlaces()
+        self._turning = TurningVehicles(config.margins.stop_m - config.margins.least_m)
         self._captured_ns: int | None = None
         self._scene_fault = ""
 
@@ -109,7 +112,7 @@ class WorldModel:
         self.bodies, self._boxes = before.bodies, before._boxes
         self._seen, self._boxed, self._unboxed = before._seen, before._boxed, before._unboxed
         self._velocity_filter, self._out_of_view = before._velocity_filter, before._out_of_view
-        self._known_places = before._known_places
+        self._known_places, self._turning = before._known_places, before._turning
         self._poses, self.surfaces, self.lens = before._poses, before.surfaces, before.lens
         self.health, self.edges = before.health, before.edges
         self._captured_ns, self._scene_fault = before._captured_ns, before._scene_fault
@@ -175,7 +178,8 @@ class WorldModel:
         except SceneError as error:
             return str(error)
         free, s_m = scene.free_space, self.corridor.path.project(pose, on_path.s_m).s_m
-        boxed = _boxed(seen.half_view_m, seen.half_across_m, seen.moving)
+        swing_m = self._turning.swing_m(seen)
+        boxed = _boxed(seen.half_view_m, seen.half_across_m, seen.moving) | (swing_m > 0.0)
         self.edges = edges = self._edges_of(free)
         self.surfaces = surfaces = surfaces_of(free, pose, self._mount, self._noise)
         boxes = self._known_places.without_newcomers(seen.select(boxed), seen.ids)
@@ -184,6 +188,7 @@ class WorldModel:
         standing = v_mps <= STANDING_MPS
         remembered = self._out_of_view.update(self._boxes, boxes, pose, edges, standing, free)
         extended = with_hidden_near_sides(boxes, pose, self._mount, self.corridor.front_m, edges)
+        extended = with_swinging_ends(extended, swing_m[boxed], pose, self.corridor.front_m)
         self.bodies = extended.joined(remembered)
         self._boxes, self._seen, self._boxed, self._unboxed = boxes, seen, boxed, None
         self.lens.look(free, self.corridor.half_width_at(s_m), self._mount.left_m)

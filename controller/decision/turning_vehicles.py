@@ -1,0 +1,117 @@
+"""Vehicles that stand or creep after they have moved: as they turn, their ends may swing towards the robot.
+
+A car that has backed out across the way, or a fork lift, turns where it is. Its middle does not move, so
+nothing tells the turn beforehand, and the end that was beside the robot's way comes nearer by more than the
+robot keeps free. controller/decision/world_model.py asks once a scene.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from controller.decision.bodies import Bodies, extended_towards
+from controller.decision.cut_movers import LEAST_AHEAD_M
+from hal.clocks import NS_PER_S
+from hal.compiled import compiled, inlined
+from hal.records import record
+from hal.types import FloatArray, Integers, PlanarPose, Vector
+
+# Of half its length, as seen from the side. A rectangle turns within the circle through its corners: one of
+# 4.3 x 1.8 m, as one of 2.4 x 1.15 m, comes nearer by 0.64 of half its length.
+_SWING_SHARE = 0.63
+_WIDER_THAN_HALF_M = 0.5  # half the width of a person with what he carries; what is wider is a vehicle
+# A faster one goes where it is seen to go, and has to slow down before it turns on the spot.
+_SLOW_MPS = 0.6
+_FOR_SURE_NS = NS_PER_S  # something static that is taken for a mover is so for some frames only
+_MOVED_NS = 5 * NS_PER_S  # who has stood for so long is not in the middle of a turn
+_WIDTH_KEPT_NS = 3 * NS_PER_S  # half a turn takes as long; in its middle a vehicle is seen end on
+_NEVER_NS = -(2**62)
+
+
+@record(frozen=True, slots=True, eq=False)
+class _Known:
+    """What is known of N tracks, (N,) each.
+
+    set_off_ns: since when it has been moving; the time of the scene while it stands.
+    moved_ns: when it was last in a motion that had lasted for some time.
+    half_m, wide_ns: its greatest half width lately, and when that was seen.
+    """
+
+    ids: Integers
+    set_off_ns: Integers
+    moved_ns: Integers
+    half_m: Vector
+    wide_ns: Integers
+
+
+class TurningVehicles:
+    """Notes which tracks have lately moved, and how wide they were.
+
+    swing_allowed_m: so much of a swing is within the margin that the robot keeps.
+    """
+
+    def __init__(self, swing_allowed_m: float) -> None:
+        self._swing_allowed_m = swing_allowed_m
+        nobody = np.zeros(0, np.int64)
+        self._known = _Known(nobody, nobody, nobody, np.zeros(0), nobody)
+
+    def swing_m(self, seen: Bodies) -> FloatArray:
+        """(N,) by how much more than the margin allows the ends of the tracks of a scene may come nearer.
+
+        0 for whatever is no vehicle that has moved lately and is slow now.
+        """
+        self._known = _Known(seen.ids, *_updated(self._known, seen))
+        return _swings(self._known, seen, self._swing_allowed_m)
+
+
+def with_swinging_ends(boxes: Bodies, swing_m: FloatArray, pose: PlanarPose, front_m: float) -> Bodies:
+    """The boxes (N) extended towards the robot by swing_m (N,), but not up to its front.
+
+    front_m: from the robot's turning centre to its foremost point.
+    """
+    if not np.count_nonzero(swing_m):
+        return boxes
+    ahead_m = (boxes.xy_m - (pose.x_m, pose.y_m)) @ (math.cos(pose.heading_rad), math.sin(pose.heading_rad))
+    room_m = ahead_m - boxes.half_view_m - front_m - LEAST_AHEAD_M
+    return extended_towards(boxes, np.minimum(swing_m, np.maximum(room_m, 0.0)), pose.heading_rad)
+
+
+@inlined
+def _row_of(ids: Integers, one: int) -> int:
+    for row in range(len(ids)):
+        if ids[row] == one:
+            return row
+    return -1
+
+
+@compiled(_Known, Bodies)
+def _updated(known: _Known, seen: Bodies) -> tuple[Integers, Integers, FloatArray, Integers]:
+    """set_off_ns, moved_ns, half_m and wide_ns of the tracks seen."""
+    now_ns, count = seen.captured_ns, len(seen.ids)
+    set_off_ns, moved_ns = np.full(count, now_ns, np.int64), np.full(count, _NEVER_NS, np.int64)
+    half_m, wide_ns = seen.half_across_m.copy(), np.full(count, now_ns, np.int64)
+    for k in range(count):
+        before = _row_of(known.ids, seen.ids[k])
+        if before >= 0:
+            moved_ns[k] = known.moved_ns[before]
+            if seen.moving[k]:
+                set_off_ns[k] = known.set_off_ns[before]
+            if half_m[k] < known.half_m[before] and now_ns - known.wide_ns[before] <= _WIDTH_KEPT_NS:
+                half_m[k], wide_ns[k] = known.half_m[before], known.wide_ns[before]
+        if now_ns - set_off_ns[k] >= _FOR_SURE_NS:
+            moved_ns[k] = now_ns
+    return set_off_ns, moved_ns, half_m, wide_ns
+
+
+@compiled(_Known, Bodies, "float64")
+def _swings(known: _Known, seen: Bodies, allowed_m: float) -> FloatArray:
+    """As TurningVehicles.swing_m."""
+    swing_m = np.zeros(len(seen.ids))
+    for k in range(len(swing_m)):
+        lately = seen.captured_ns - known.moved_ns[k] <= _MOVED_NS
+        slow = math.hypot(seen.measured_mps[k, 0], seen.measured_mps[k, 1]) < _SLOW_MPS
+        if lately and slow and known.half_m[k] > _WIDER_THAN_HALF_M:
+            swing_m[k] = max(_SWING_SHARE * known.half_m[k] - allowed_m, 0.0)
+    return swing_m

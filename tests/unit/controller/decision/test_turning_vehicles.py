@@ -1,0 +1,109 @@
+"""A vehicle that has driven and stands, or creeps, may swing its ends towards the robot."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from controller.decision.bodies import Bodies
+from controller.decision.turning_vehicles import TurningVehicles, with_swinging_ends
+from hal.clocks import NS_PER_S
+from hal.types import PlanarPose
+from tests.support.floor_bodies import box
+
+ALLOWED_M, FRONT_M = 0.25, 0.6
+HALF_LENGTH_M = 1.2  # a fork lift, as seen from the side
+SWING_M = 0.63 * HALF_LENGTH_M - ALLOWED_M
+
+
+def seen(now_s: float, mps: float = 0.0, half_across_m: float = HALF_LENGTH_M, track_id: int = 1) -> Bodies:
+    """A vehicle across the way, 4 m ahead, that drives at mps."""
+    captured_ns = round(now_s * NS_PER_S)
+    return box(
+        4.0,
+        0.0,
+        0.0,
+        mps,
+        number=track_id,
+        half_view_m=0.5,
+        half_across_m=half_across_m,
+        captured_ns=captured_ns,
+    )
+
+
+def swing_after(*scenes: Bodies) -> float:
+    vehicles = TurningVehicles(ALLOWED_M)
+    return [float(vehicles.swing_m(scene)[0]) for scene in scenes][-1]
+
+
+def test_a_vehicle_that_has_just_stopped_may_swing_beyond_the_margin() -> None:
+    assert swing_after(seen(0.0, 1.0), seen(1.0, 1.0), seen(1.1)) == pytest.approx(SWING_M)
+
+
+@pytest.mark.parametrize(("half_length_m", "half_width_m"), [(1.2, 0.575), (2.15, 0.9)])
+def test_the_swing_is_that_of_a_rectangle_about_its_middle(half_length_m: float, half_width_m: float) -> None:
+    """From its flank to the circle through its corners: a fork lift of 2.4 x 1.15 m, a car of 4.3 x 1.8 m."""
+    scenes = seen(0.0, 1.0, half_length_m), seen(1.0, 1.0, half_length_m), seen(1.1, 0.0, half_length_m)
+    comes_nearer_m = math.hypot(half_length_m, half_width_m) - half_width_m
+    assert swing_after(*scenes) + ALLOWED_M == pytest.approx(comes_nearer_m, abs=0.08)
+
+
+@pytest.mark.parametrize("mps", [0.0, 0.5, -0.5])
+def test_it_may_while_it_creeps(mps: float) -> None:
+    assert swing_after(seen(0.0, 1.0), seen(1.0, 1.0), seen(1.1, mps)) == pytest.approx(SWING_M)
+
+
+def test_one_that_drives_goes_where_it_is_seen_to_go() -> None:
+    assert swing_after(seen(0.0, 1.0), seen(1.0, 1.0)) == 0.0
+
+
+def test_a_crate_that_never_moved_does_not_turn() -> None:
+    assert swing_after(seen(0.0), seen(1.0), seen(2.0)) == 0.0
+
+
+def test_what_seemed_to_move_for_some_frames_does_not_turn() -> None:
+    assert swing_after(seen(0.0), seen(0.1, 1.0), seen(0.9, 1.0), seen(1.0)) == 0.0
+
+
+def test_a_motion_that_was_broken_off_counts_anew() -> None:
+    assert (
+        swing_after(seen(0.0, 1.0), seen(0.6, 1.0), seen(0.7), seen(0.8, 1.0), seen(1.6, 1.0), seen(1.7))
+        == 0.0
+    )
+
+
+def test_a_person_turns_within_the_margin() -> None:
+    assert swing_after(seen(0.0, 1.0, 0.45), seen(1.0, 1.0, 0.45), seen(1.1, 0.0, 0.45)) == 0.0
+
+
+def test_one_that_has_stood_for_five_seconds_is_not_turning() -> None:
+    stood = [seen(1.0 + t, 0.0) for t in (1.0, 2.0, 3.0, 4.0, 4.9)]
+    assert swing_after(seen(0.0, 1.0), seen(1.0, 1.0), *stood) > 0.0
+    assert swing_after(seen(0.0, 1.0), seen(1.0, 1.0), *stood, seen(6.1)) == 0.0
+
+
+def test_its_length_is_remembered_while_it_turns_end_on() -> None:
+    """Half way round, the robot sees its end. As it turns on, the other end comes nearer."""
+    turning = seen(0.0, 1.0), seen(1.0, 1.0), seen(1.2), seen(2.0, 0.0, 0.6), seen(4.0, 0.0, 0.6)
+    assert swing_after(*turning) == pytest.approx(SWING_M)
+    assert swing_after(*turning, seen(4.4, 0.0, 0.6)) == pytest.approx(0.63 * 0.6 - ALLOWED_M)
+
+
+def test_each_track_has_a_memory_of_its_own() -> None:
+    assert swing_after(seen(0.0, 1.0), seen(1.0, 1.0), seen(1.1, track_id=2)) == 0.0
+
+
+def test_its_box_is_extended_towards_the_robot() -> None:
+    near = with_swinging_ends(seen(0.0), np.array([SWING_M]), PlanarPose(0.0, 0.0, 0.0), FRONT_M)
+    assert float(near.xy_m[0, 0] - near.half_view_m[0]) == pytest.approx(3.5 - SWING_M)
+    assert float(near.xy_m[0, 0] + near.half_view_m[0]) == pytest.approx(4.5)
+
+
+def test_it_is_not_extended_to_what_the_front_has_passed() -> None:
+    """The conflict with a body that begins behind the robot's front is dropped: its front is past it."""
+    near = with_swinging_ends(seen(0.0), np.array([SWING_M]), PlanarPose(2.5, 0.0, 0.0), FRONT_M)
+    assert float(near.xy_m[0, 0] - near.half_view_m[0]) == pytest.approx(2.5 + FRONT_M + 0.3)
+    beside = with_swinging_ends(seen(0.0), np.array([SWING_M]), PlanarPose(3.0, 0.0, 0.0), FRONT_M)
+    assert float(beside.xy_m[0, 0] - beside.half_view_m[0]) == 3.5
