@@ -2,7 +2,7 @@
 
 No camera sees round a corner, and no braking is in time for somebody who is first seen half a metre beside
 the corridor. A driver passes such a place slower, and so does the robot. The ends of faces are found in the
-surfaces that depth sees. Crates and posts are no faces: nobody can walk up unseen behind them.
+surfaces that depth sees. Crates, posts and pallets are no faces: nobody can walk up unseen behind them.
 controller/decision/sight.py calls BlindCorners once a scene.
 """
 
@@ -21,6 +21,7 @@ from hal.types import Integers, Vector
 IntArray = NDArray[np.intp]
 
 _FACE_M = 1.0  # least length of a face
+LOW_M = 0.5  # over what is lower, such as a pallet, whoever is behind it is seen
 _LOOK_AHEAD_M = 5.0  # faces are looked for this far ahead of the robot's front
 _STEP_ASIDE_M = 0.3  # neighbouring points of one face differ by less than this
 # A face seen at a flat angle goes on by _band_spacing_m from one band to the next; 1.5 times that still is
@@ -87,22 +88,22 @@ class BlindCorners:
     def look(
         self,
         surfaces: SurfacesOnPath,
-        stands: NDArray[np.bool_],
+        hides: NDArray[np.bool_],
         band_tan: float,
         front_s_m: float,
     ) -> None:
         """Take in the P surfaces of one scene, in the order of their bands.
 
-        stands: (P,) whether a surface belongs to no mover. Movers are no faces, least of all people who walk
-        one behind the other.
+        hides: (P,) whether a surface belongs neither to a mover nor to what is lower than LOW_M. Movers are no
+        faces, least of all people who walk one behind the other.
         band_tan: width of a band. front_s_m: path coordinate of the robot's front.
         """
         for corner in self._corners:
             # Nearer than _SURE_M, a corner is not given up for not being seen.
             corner.score -= 1 if corner.s_m - front_s_m > _SURE_M else 0
-            corner.score -= 2 if _closed(surfaces, stands, corner) else 0
+            corner.score -= 2 if _closed(surfaces, hides, corner) else 0
         s_m, d_m, half_width_m = surfaces.s_m, surfaces.d_m, surfaces.half_width_m
-        ends = _blind_ends(surfaces, stands, band_tan, front_s_m, self._beside_m)
+        ends = _blind_ends(surfaces, hides, band_tan, front_s_m, self._beside_m)
         for end in ends.tolist():
             beside_m = float(abs(d_m[end]) - half_width_m[end])
             self._note(float(s_m[end]), bool(d_m[end] > 0.0), beside_m)
@@ -164,7 +165,7 @@ def _ends_blind(points: SurfacesOnPath, first: int, last: int, inward: int, band
 
 
 @compiled(SurfacesOnPath, "boolean[:]", _Corner)
-def _closed(points: SurfacesOnPath, stands: NDArray[np.bool_], corner: _Corner) -> bool:
+def _closed(points: SurfacesOnPath, hides: NDArray[np.bool_], corner: _Corner) -> bool:
     """Whether no passage can begin at the corner: what stands there leaves no gap as wide.
 
     A post or a box in front of a rack's goods hides a strip of them from afar, and the strip grows narrower
@@ -175,7 +176,7 @@ def _closed(points: SurfacesOnPath, stands: NDArray[np.bool_], corner: _Corner) 
     along_m[0], count = end_m, 1
     for k in range(len(points.bands)):
         aside_m = abs(points.d_m[k]) - points.half_width_m[k]
-        at_face = stands[k] and 0.0 < aside_m < corner.beside_m + _STEP_ASIDE_M
+        at_face = hides[k] and 0.0 < aside_m < corner.beside_m + _STEP_ASIDE_M
         if at_face and (points.d_m[k] > 0.0) == corner.left and begin_m < points.s_m[k] < end_m:
             along_m[count] = points.s_m[k]
             count += 1
@@ -190,7 +191,7 @@ def _closed(points: SurfacesOnPath, stands: NDArray[np.bool_], corner: _Corner) 
 @compiled(SurfacesOnPath, "boolean[:], float64, float64, float64")
 def _blind_ends(
     points: SurfacesOnPath,
-    stands: NDArray[np.bool_],
+    hides: NDArray[np.bool_],
     band_tan: float,
     front_s_m: float,
     max_beside_m: float,
@@ -208,7 +209,7 @@ def _blind_ends(
         for n in range(count):
             k = n if inward > 0 else count - 1 - n
             aside_m, ahead_m = abs(points.d_m[k]) - points.half_width_m[k], points.s_m[k] - front_s_m
-            close = stands[k] and 0.0 < aside_m <= max_beside_m and ahead_m < _LOOK_AHEAD_M
+            close = hides[k] and 0.0 < aside_m <= max_beside_m and ahead_m < _LOOK_AHEAD_M
             if not close or (points.d_m[k] > 0.0) != (inward > 0):
                 continue
             if last < 0 or not _goes_on(points, last, k, band_tan):

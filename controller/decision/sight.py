@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.decision import DecisionConfig
-from controller.decision.blind_corners import BlindCorners, SurfacesOnPath
+from controller.decision.blind_corners import LOW_M, BlindCorners, SurfacesOnPath
 from controller.decision.bodies import Bodies
 from controller.decision.corridor import BEYOND_RANGE_M, Corridor
 from controller.decision.held_surface import SAME_SURFACE_M, HeldSurface, Nearest
@@ -102,7 +102,8 @@ class Sight:
             self._lateral_m,
             len(free.bearing_tan),
         )
-        self.corners.look(on_path, found.stands, 2.0 * free.half_width_tan, s_m + self._corridor.front_m)
+        hides = found.stands & ~belongs[:, explained_by.top_m < LOW_M].any(axis=1)
+        self.corners.look(on_path, hides, 2.0 * free.half_width_tan, s_m + self._corridor.front_m)
         if found.nearest_s_m < math.inf:
             self.surface_clearance_m = found.clearance_m
         explained_s = self._explained(on_path, found.explained, found.nearest)

@@ -62,13 +62,17 @@ def test_surface_of_a_tracked_obstacle_is_not_counted_twice() -> None:
     assert Watch().look(free(person), times=5, explained=box(6.5, 0.0)).surface_s_m == pytest.approx(4.4)
 
 
-@pytest.mark.parametrize(("vx_mps", "corner"), [(0.0, True), (-1.0, False)])
-def test_only_what_stands_hides_whoever_steps_out_behind_it(vx_mps: float, corner: bool) -> None:
-    """A face from 1.8 to 3.8 m ahead, 0.4 m beside the swept width: a rack, or people in a row."""
+@pytest.mark.parametrize(
+    ("vx_mps", "top_m", "corner"), [(0.0, 1.7, True), (0.0, 0.6, True), (0.0, 0.15, False), (-1.0, 1.7, False)]
+)
+def test_only_what_stands_and_is_high_hides_whoever_steps_out_behind_it(
+    vx_mps: float, top_m: float, corner: bool
+) -> None:
+    """A face from 1.8 to 3.8 m ahead, 0.4 m beside the swept width: a rack, pallets, or people in a row."""
     with np.errstate(divide="ignore"):
         at = -0.8 / BEARING
     face = np.where((at > 1.4) & (at < 3.4), at, math.inf)
-    row = box(2.8, 0.9, vx_mps, half_view_m=1.0, half_across_m=0.2)
+    row = box(2.8, 0.9, vx_mps, half_view_m=1.0, half_across_m=0.2, top_m=top_m)
     sight = Watch().look(free(nearest_m=face), times=5, explained=row)
     assert (sight.corners.nearest(0.5) is not None) == corner
 
