@@ -94,8 +94,8 @@ class BlindCorners:
     ) -> None:
         """Take in the P surfaces of one scene, in the order of their bands.
 
-        hides: (P,) whether a surface belongs neither to a mover nor to what is lower than LOW_M. Movers are no
-        faces, least of all people who walk one behind the other.
+        hides: (P,) whether a surface belongs neither to a mover nor to what is lower than LOW_M. Movers are
+        no faces, least of all people who walk one behind the other.
         band_tan: width of a band. front_s_m: path coordinate of the robot's front.
         """
         for corner in self._corners:

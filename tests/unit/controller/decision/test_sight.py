@@ -63,7 +63,8 @@ def test_surface_of_a_tracked_obstacle_is_not_counted_twice() -> None:
 
 
 @pytest.mark.parametrize(
-    ("vx_mps", "top_m", "corner"), [(0.0, 1.7, True), (0.0, 0.6, True), (0.0, 0.15, False), (-1.0, 1.7, False)]
+    ("vx_mps", "top_m", "corner"),
+    [(0.0, 1.7, True), (0.0, 0.6, True), (0.0, 0.15, False), (-1.0, 1.7, False)],
 )
 def test_only_what_stands_and_is_high_hides_whoever_steps_out_behind_it(
     vx_mps: float, top_m: float, corner: bool
