@@ -27,6 +27,7 @@ from controller.terminal.outlet import say
 from sim.families import FAMILY_NAMES
 
 FAILING = "failing"
+_MOST_NAMED = 6  # failed missions that are named in the terminal
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +89,11 @@ def run_campaign(options: CampaignOptions) -> int:
         raise Interrupted(f"{done}; the same command with --resume goes on") from None
     store.rewrite()
     summary = write_report(
-        options.report, store.rows.values(), command_line(options), kept_scenarios(options.report)
+        options.report,
+        store.rows.values(),
+        command_line(options),
+        f"treadwatch campaign --mode {options.mode}{config_option_text(options.config_path)} --only",
+        kept_scenarios(options.report),
     )
     _print_summary(summary, len(tasks), time.perf_counter() - began_s, options.report)
     _note_earlier(store, named)
@@ -223,6 +228,10 @@ def _print_summary(summary: Summary, count: int, took_s: float, folder: Path) ->
             f"time over the oracle's {median} (p90 {p90}), false stops {totals.false_stops}, "
             f"flaps {totals.flaps}, outside limits {totals.limit_violations}"
         )
+    failing = [f"{family}:{seed}" for family, seed, policy, _ in summary.failing if policy == OURS]
+    if failing:
+        more = f" and {len(failing) - _MOST_NAMED} more" if len(failing) > _MOST_NAMED else ""
+        say(f"failed   {', '.join(failing[:_MOST_NAMED])}{more} ({OURS})")
     if count:
         say(f"speed    {count} missions in {took_s:.1f} s: {count / took_s:.2g} a second")
     say(f"report   {folder / 'report.md'}")

@@ -24,15 +24,21 @@ _MAX_FAILED_ROWS = 40  # that are listed in the report; missions.jsonl has all
 
 
 def write_report(
-    folder: Path, rows: Iterable[Row], command: str, own: Mapping[str, Scenario] | None = None
+    folder: Path,
+    rows: Iterable[Row],
+    command: str,
+    only: str,
+    own: Mapping[str, Scenario] | None = None,
 ) -> Summary:
     """Write everything except missions.jsonl. Raises UserError.
 
-    command: the command that repeats it. own: the scenario files that were driven, by their names.
+    command: the command that repeats it. only: the one that repeats one mission, without the mission.
+    own: the scenario files that were driven, by their names.
     """
-    rows = list(rows)
+    rows, own = list(rows), own or {}
     summary = summarise(rows)
-    driven = driven_rows(rows, own or {})
+    driven = driven_rows(rows, own)
+    files = {family: str(folder / KEPT / family) for family in own}
     content = {
         "command": command,
         "missions": len({(row.family, row.seed) for row in rows}),
@@ -42,7 +48,8 @@ def write_report(
         (folder / "summary.json").write_text(
             json.dumps({**content, **summary.as_dict()}, indent=2) + "\n", encoding="utf-8"
         )
-        (folder / "report.md").write_text("\n".join(report_lines(summary, command, driven)), encoding="utf-8")
+        lines = report_lines(summary, command, driven, only, files)
+        (folder / "report.md").write_text("\n".join(lines), encoding="utf-8")
     except OSError as error:
         raise UserError(f"{folder}: the report cannot be written ({error.strerror})") from error
     for name, image in (
@@ -87,8 +94,10 @@ def _seeds_in_words(seeds: set[int]) -> str:
     return str(min(seeds)) if len(seeds) == 1 else f"{min(seeds)} to {max(seeds)}"
 
 
-def report_lines(summary: Summary, command: str, driven: list[list[str]]) -> list[str]:
-    """The report as Markdown."""
+def report_lines(
+    summary: Summary, command: str, driven: list[list[str]], only: str, files: Mapping[str, str]
+) -> list[str]:
+    """The report as Markdown. command, only: as in write_report. files: the scenario files' paths by name."""
     lines = ["# Campaign", "", f"    {command}", ""]
     lines += markdown.section(
         "What was driven",
@@ -125,12 +134,13 @@ def report_lines(summary: Summary, command: str, driven: list[list[str]]) -> lis
     lines += markdown.table(("mission", "policy", "body", "robot's speed m/s"), _not_at_fault(summary))
     lines += markdown.section(
         "What failed",
-        "Each can be driven again alone: `treadwatch campaign --only FAMILY:SEED`, or `FILE.yaml:SEED`.",
+        f"Each can be driven again alone, for example: `{only} MISSION --policies POLICY`.",
     )
     shown = [
-        [family, str(seed), policy, why] for family, seed, policy, why in summary.failing[:_MAX_FAILED_ROWS]
+        [f"{shlex.quote(files.get(family, family))}:{seed}", policy, why]
+        for family, seed, policy, why in summary.failing[:_MAX_FAILED_ROWS]
     ]
-    lines += markdown.table(["family", "seed", "policy", "why"], shown)
+    lines += markdown.table(["mission", "policy", "why"], shown)
     if len(summary.failing) > _MAX_FAILED_ROWS:
         lines += [f"... and {len(summary.failing) - _MAX_FAILED_ROWS} more: see summary.json.", ""]
     return lines

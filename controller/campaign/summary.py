@@ -111,7 +111,7 @@ def _json_values(totals: Totals) -> dict[str, object]:
 
 
 def summarise(rows: Iterable[Row]) -> Summary:
-    """Summarise rows, with policies in the order of POLICY_NAMES, families in that of the rows."""
+    """Summarise rows: policies and failures in the order of POLICY_NAMES, families in that of the rows."""
     rows = list(rows)
     driven = {row.policy for row in rows}
     # In their own order: the file of missions is sorted, so that "field" would come before "ours".
@@ -127,7 +127,11 @@ def summarise(rows: Iterable[Row]) -> Summary:
             }
             for family in families
         },
-        [(row.family, row.seed, row.policy, why_failed(row)) for row in rows if failed(row)],
+        [
+            (row.family, row.seed, row.policy, why_failed(row))
+            for row in sorted(rows, key=lambda row: policies.index(row.policy))
+            if failed(row)
+        ],
         [
             (row.family, row.seed, row.policy, body, v_mps)
             for row in rows

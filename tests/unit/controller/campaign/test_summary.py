@@ -48,6 +48,20 @@ def test_failed_missions_are_listed_with_their_reason() -> None:
     ]
 
 
+def test_our_failures_come_first_and_say_how_to_repeat_them() -> None:
+    """A scenario file is named as it can be given: by its copy in the report's folder."""
+    lost = [made_row(seed, contacts=1, contacts_at_fault=1, touched=("pallet",)) for seed in (1, 2)]
+    yard = replace(lost[1], family="yard.yaml")
+    summary = summarise([replace(lost[0], policy="field"), lost[0], replace(yard, policy="field"), yard])
+    assert [one[2] for one in summary.failing] == ["ours", "ours", "field", "field"]
+    only = "treadwatch campaign --mode noise --config robot.yaml --only"
+    files = {"yard.yaml": "out/my report/scenarios/yard.yaml"}
+    lines = report_lines(summary, "treadwatch campaign", [], only, files)
+    assert any(f"`{only} MISSION --policies POLICY`" in line for line in lines)
+    assert "| crossing_left:1 | ours | touched pallet while driving |" in lines
+    assert "| 'out/my report/scenarios/yard.yaml':2 | ours | touched pallet while driving |" in lines
+
+
 def hit(policy: str = "ours") -> Row:
     row = made_row(7, contacts=1, touched_not_at_fault=("pedestrian",), touched_at_mps=(0.41,))
     return replace(row, policy=policy)
@@ -56,7 +70,7 @@ def hit(policy: str = "ours") -> Row:
 def test_contacts_that_were_not_at_fault_are_listed() -> None:
     summary = summarise([made_row(1), hit()])
     assert summary.not_at_fault == [("crossing_left", 7, "ours", "pedestrian", 0.41)]
-    text = "\n".join(report_lines(summary, "treadwatch campaign", []))
+    text = "\n".join(report_lines(summary, "treadwatch campaign", [], "treadwatch campaign --only", {}))
     assert "| crossing_left:7 | ours | pedestrian | 0.41 |" in text
 
 
@@ -67,7 +81,7 @@ def test_such_a_contact_is_read_back_from_the_file() -> None:
 def test_our_policy_comes_first_and_a_family_is_one_row() -> None:
     summary = summarise([hit("field"), hit("ours"), hit("another")])
     assert list(summary.policies) == ["ours", "field", "another"]
-    lines = report_lines(summary, "treadwatch campaign", [])
+    lines = report_lines(summary, "treadwatch campaign", [], "treadwatch campaign --only", {})
     assert "|  | family | ours | field | another |" in lines
     assert sum(line.startswith("| 1 | crossing_left |") for line in lines) == 1
 
