@@ -26,8 +26,8 @@ from controller.evaluation.scores.totals import ratio
 from controller.evaluation.types import FrameTruth
 from controller.perceive import Look
 from controller.replay.build import build_replay_perceiver
+from hal.cameras.recording import frames_of
 from hal.clocks import NS_PER_S
-from hal.errors import EndOfStream
 from vision.scene import CameraCondition
 
 MAX_PICTURES = 6
@@ -157,11 +157,7 @@ def evaluate_recording(
     perceiver = build_replay_perceiver(config, source.mount, poses, time.perf_counter_ns)
     tally = _Tally()
     with source:
-        while True:
-            try:
-                frame = source.read(timeout_s=0.0)
-            except EndOfStream:
-                break
+        for frame in frames_of(source):
             tally.add(name, perceiver.look(frame))
             on_frame()
     return RecordingRecord(

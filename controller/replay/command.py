@@ -33,8 +33,8 @@ from controller.terminal.console import Console
 from hal.cameras.bag_topics import WantedTopics
 from hal.cameras.gyro_track import GyroTrack
 from hal.cameras.pose_track import PoseTrack
+from hal.cameras.recording import frames_of
 from hal.clocks import NS_PER_S
-from hal.errors import EndOfStream
 from hal.geometry import mount_of
 from hal.types import CameraMount, Intrinsics, PlanarPose
 
@@ -103,11 +103,7 @@ def run_replay(options: ReplayOptions) -> None:
         recorder = devices.enter_context(
             open_recorder(recording, replay_video_settings(config, mount, source.fps))
         )
-        while True:
-            try:
-                frame = source.read(timeout_s=0.0)
-            except EndOfStream:
-                break
+        for frame in frames_of(source):
             look = perceiver.look(frame)
             v_mps = speed.step(look.scene.ego_motion)
             decision = _decide(decide, path, look, v_mps)

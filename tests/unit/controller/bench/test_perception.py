@@ -31,7 +31,7 @@ SETTINGS = PerceptionConfig().fragments
 
 @pytest.fixture(scope="module")
 def reel() -> Reel:
-    whole = recorded_reel(TumReplay(DESK), None)
+    whole = recorded_reel(TumReplay(DESK))
     return Reel(whole.frames[:3], whole.odometry[:3], whole.mount)
 
 
