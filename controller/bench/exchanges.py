@@ -22,13 +22,14 @@ from controller.build_chassis import (
     build_serial_emulator,
 )
 from hal.api import Chassis
+from hal.clocks import NS_PER_MS
 from hal.errors import HalError
 from hal.types import PlanarPose
 from sim.plant import TrackedPlant
 from sim.simulation import Emulator
 
 _ORIGIN = PlanarPose(0.0, 0.0, 0.0)
-_PTY_DELAY_NS = 100_000  # within this time the kernel passes on the bytes of a pseudo-terminal
+_PTY_DELAY_NS = NS_PER_MS // 10  # within this time the kernel passes on the bytes of a pseudo-terminal
 
 
 @dataclass(frozen=True, slots=True)
