@@ -114,8 +114,11 @@ class Fault:
     during: Callable[[TrialRig], None] = _keep_commanding
 
 
+# No fault, but what all others are compared with.
+_REQUESTED_STOP = Fault("stop is asked for", during=lambda rig: rig.step(0.0))
+
 FAULTS = (
-    Fault("stop is asked for", during=lambda rig: rig.step(0.0)),
+    _REQUESTED_STOP,
     Fault("e-stop", lambda rig: rig.emulator.press_estop(), lambda rig: rig.emulator.release_estop()),
     Fault("base restarts", lambda rig: rig.emulator.restart()),
     Fault("base frozen", lambda rig: rig.emulator.freeze(), lambda rig: rig.emulator.thaw()),
@@ -148,8 +151,7 @@ def run_trial(kind: str, fault: Fault) -> TrialResult:
         fault.during(rig)
         fault.end(rig)
         stood_m = rig.travelled_m
-        # The first entry is a requested stop and no fault, so nothing asks for a speed afterwards.
-        rig.run(_OBSERVATION_S, 0.0 if fault is FAULTS[0] else _SPEED_MPS)
+        rig.run(_OBSERVATION_S, 0.0 if fault is _REQUESTED_STOP else _SPEED_MPS)
         state = rig.state
         assert state is not None
         moved_m = rig.travelled_m - stood_m
@@ -157,5 +159,12 @@ def run_trial(kind: str, fault: Fault) -> TrialResult:
         rig.run(2.0, _SPEED_MPS)
         drives_again = drives_again and rig.emulator.plant.twist[0] > 0.2
     return TrialResult(
-        kind, fault.name, state.mode, state.reason, stood_s, travelled_m, moved_m, drives_again
+        kind=kind,
+        fault=fault.name,
+        mode=state.mode,
+        reason=state.reason,
+        stood_after_s=stood_s,
+        travelled_m=travelled_m,
+        moved_after_m=moved_m,
+        drives_again=drives_again,
     )

@@ -60,19 +60,31 @@ class GovernorLoop(DriveLoop):
             # When the chassis follows setpoints again, shaping begins from standstill.
             self._governor.rest()
         governed = self._governor.step(
-            now_ns, scene, None if cap.zero_reason else asked.twist, pose, self._base.measured_mps,
-            cap.zero_reason or asked.silence, cap,
-        )  # fmt: skip
+            now_ns,
+            scene,
+            None if cap.zero_reason else asked.twist,
+            pose,
+            self._base.measured_mps,
+            silence=cap.zero_reason or asked.silence,
+            cap=cap,
+        )
         setpoint = Setpoint(now_ns, governed.v_mps, governed.a_mps2, governed.w_radps)
         state = self._base.finish_step(setpoint, now_ns, zero=cap.zero_reason != "")
         self._note_travel(pose)
         self._commands.tell(governed.v_mps, governed.w_radps, governed.decision, self._mode)
-        on_path = self._governor.on_path
-        scene_ns = None if scene is None else scene.captured_ns
         return ControlStep(
-            now_ns, pose, self._travelled_m, on_path.d_m, scene_ns, governed.decision, setpoint,
-            state, self._ahead(), governed.fault, cap.zero_reason,
-        )  # fmt: skip
+            now_ns=now_ns,
+            pose=pose,
+            progress_m=self._travelled_m,
+            lateral_m=self._governor.on_path.d_m,
+            scene_ns=None if scene is None else scene.captured_ns,
+            decision=governed.decision,
+            setpoint=setpoint,
+            chassis=state,
+            ahead_m=self._ahead(),
+            fault=governed.fault,
+            unanswered=cap.zero_reason,
+        )
 
     def _asked(self, now_ns: int) -> RequestState:
         """What the planner asks for; nothing while the drive ends or the chassis does not obey."""

@@ -117,18 +117,18 @@ class Recorder:
         if video is not None and self._isolation.is_active(video):
             settings = self._settings
             moment = VideoMoment(
-                look.frame,
-                look.scene,
-                look.fragments,
-                decision,
-                commanded_mps,
-                measured_mps,
-                settings.mount,
-                settings.body,
-                path_ahead_m,
-                settings.corridor_half_width_m,
-                ending,
-                settings.own_parts,
+                frame=look.frame,
+                scene=look.scene,
+                fragments=look.fragments,
+                decision=decision,
+                commanded_mps=commanded_mps,
+                measured_mps=measured_mps,
+                mount=settings.mount,
+                body=settings.body,
+                path_ahead_m=path_ahead_m,
+                corridor_half_width_m=settings.corridor_half_width_m,
+                ending=ending,
+                own_parts=settings.own_parts,
             )
             with self._isolation.guard(video):
                 video.write(self._composer.compose(moment), look.frame.captured_ns)
