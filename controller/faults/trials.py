@@ -9,16 +9,12 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from config.app import load_app
-from config.loader import CONFIG_DIR
+from config.app import hil_file, load_app
 from controller.build_chassis import build_base_in_memory
 from controller.shape import SpeedShaper
 from hal.clocks import NS_PER_S
 from hal.types import ChassisMode, ChassisState, PlanarPose, Setpoint
 from sim.plant import PLANT_REST_MPS, PLANT_REST_RADPS
-
-# Every base that can be emulated.
-KINDS = tuple(sorted(path.stem.removeprefix("hil-") for path in CONFIG_DIR.glob("hil-*.yaml")))
 
 _PERIOD_NS = NS_PER_S // 50
 _SPEED_MPS = 0.5
@@ -51,7 +47,7 @@ class TrialRig:
     """A guarded driver and its base, driven as by the control loop: shaped speeds while armed."""
 
     def __init__(self, kind: str) -> None:
-        config = load_app(CONFIG_DIR / f"hil-{kind}.yaml")
+        config = load_app(hil_file(kind))
         self.chassis, self.emulator, self.link = build_base_in_memory(config, PlanarPose(0.0, 0.0, 0.0), 0)
         self._shaper = SpeedShaper(config.robot.limits, _PERIOD_NS / NS_PER_S)
         self.now_ns = 0

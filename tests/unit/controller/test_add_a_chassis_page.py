@@ -9,10 +9,10 @@ from typing import get_args
 import pytest
 import yaml
 
+from config.app import HIL_BASES
 from config.chassis import CHASSIS_KINDS, AnyChassisConfig
 from config.loader import CONFIG_DIR
 from controller.cli.emulate import FAULTS
-from controller.faults.trials import KINDS as EVERY_BASE
 from hal.chassis.driver import ChassisDriver, ChassisFeedback
 from hal.links.scripted import serial_pair
 from hal.types import Setpoint
@@ -136,7 +136,7 @@ STEPS = {
     ),
     "own time-out": lambda kind: f'"{kind}": ' in read("tests/unit/controller/faults/test_faults.py"),
     "guard": lambda kind: f'"{kind}": {kind}_rig' in read("tests/unit/controller/base/test_guard.py"),
-    "mission and faults": lambda kind: kind in EVERY_BASE,
+    "mission and faults": lambda kind: kind in HIL_BASES,
     "README": lambda kind: kind.lower() in read("README.md").lower(),
 }
 
