@@ -16,7 +16,6 @@ from controller.control import ControlStep
 from controller.decision.decision import Decision
 from controller.governor.governor import SpeedGovernor
 from controller.governor.inbox import RequestState
-from controller.record.recorder import path_ahead
 from hal.api import Chassis
 from hal.types import FloatArray, PlanarPose, Setpoint
 from vision.scene import Scene
@@ -114,4 +113,4 @@ class GovernorLoop(DriveLoop):
         path = self._governor.path
         if path is None:
             return None
-        return path_ahead(path, self._governor.on_path.s_m, path.pose(self._governor.on_path.s_m))
+        return path.ahead(self._governor.on_path.s_m, path.pose(self._governor.on_path.s_m))

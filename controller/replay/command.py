@@ -23,10 +23,10 @@ from controller.decision.decision import Decision
 from controller.decision.situation import Situation
 from controller.errors import UserError
 from controller.own_parts import require_own_parts_in_view
-from controller.path.path import OnPath, Path
+from controller.path.path import STRAIGHT_AHEAD_M, OnPath, Path
 from controller.perceive import Look
 from controller.record.observations import STANDARD_OUTPUT
-from controller.record.recorder import STRAIGHT_AHEAD_M, RecordingOptions, open_recorder, require_two_files
+from controller.record.recorder import RecordingOptions, open_recorder, require_two_files
 from controller.record.tally import ConditionTally, ObstacleTally, TimingTally
 from controller.replay.build import build_replay_decision, build_replay_perceiver, replay_video_settings
 from controller.terminal.console import Console

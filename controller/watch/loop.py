@@ -13,8 +13,7 @@ from controller.base.ego_speed import EgoSpeed
 from controller.base.localise import Localiser
 from controller.control import ControlStep, Decides
 from controller.decision.situation import Situation
-from controller.path.path import OnPath, Path
-from controller.record.recorder import STRAIGHT_AHEAD_M
+from controller.path.path import STRAIGHT_AHEAD_M, OnPath, Path
 from hal.api import ChassisListener
 from hal.clocks import NS_PER_S
 from hal.types import PlanarPose, Setpoint
