@@ -7,9 +7,6 @@ from pathlib import Path as FilePath
 import cv2
 import pytest
 
-from config.path import LineSpec, PathSpec
-from config.robot import Robot
-from controller.path.path import Path
 from controller.perceive import Look
 from controller.record.observations import ObservationFile
 from controller.record.recorder import (
@@ -20,10 +17,11 @@ from controller.record.recorder import (
     open_recorder,
 )
 from hal.types import ColourImage
+from tests.support.floor_bodies import line_path
 from tests.support.runner_doubles import EmptyScenePerceiver, PeriodicCamera, control_step
 from tests.support.video_moments import AROUND, frame
 
-STRAIGHT = Path(PathSpec(segments=(LineSpec(kind="line", length_m=20.0),)), Robot())
+STRAIGHT = line_path(20.0)
 
 
 def written(path: FilePath) -> list[dict[str, object]]:
