@@ -64,7 +64,7 @@ def test_a_line_where_nobody_answers_is_told(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", SERIAL_BASES)
-def test_a_wrong_baud_rate(kind: str) -> None:
+def test_at_a_wrong_baud_rate_arming_gives_up_with_a_hint(kind: str) -> None:
     """Bits sampled at another rate: other bytes, of about the same number."""
     rng = random.Random(7)
     near, far = serial_pair()
@@ -79,7 +79,7 @@ def test_a_wrong_baud_rate(kind: str) -> None:
     assert base.plant.track_travel_m == (0.0, 0.0)
 
 
-def test_a_wrong_address() -> None:
+def test_a_base_at_another_address_is_silence_with_a_hint_to_the_address() -> None:
     near, far = serial_pair()
     config = chassis_config("roboclaw").model_copy(update={"address": 0x83})
     base = build_serial_emulator(config, far, TrackedPlant(PLANT))

@@ -43,7 +43,7 @@ def test_page_names_the_fields_of_the_feedback(word: str) -> None:
     assert hasattr(ChassisFeedback, word)
 
 
-def test_the_faults_to_type() -> None:
+def test_the_page_names_the_faults_that_the_emulator_takes() -> None:
     assert set(FAULTS) <= set(PAGE.quoted)
 
 

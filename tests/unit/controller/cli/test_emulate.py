@@ -74,7 +74,7 @@ def test_a_process_that_was_frozen_does_not_send_what_it_missed() -> None:
     assert emulator.plant.twist[0] == pytest.approx(0.0, abs=1e-3), "its own time-out ran meanwhile"
 
 
-def test_faults_by_word() -> None:
+def test_a_word_makes_a_fault_and_an_unknown_word_is_answered() -> None:
     _, base = can_pair()
     emulator = AgilexEmulator(base, TrackedPlant(PLANT))
     words = iter([["estop"], [], ["release", "boom"], *[[]] * 1000])
