@@ -18,6 +18,7 @@ _D435I_ASPECT = 16.0 / 9.0
 # Where a recording's odometry comes from; auto: odometry.txt if the recording has one.
 OdometryChoice = Literal["auto", "file", "none", "groundtruth"]
 
+
 # Width and height of the image, fx, fy, cx, cy, all in pixels.
 NominalView = tuple[int, int, float, float, float, float]
 
@@ -34,12 +35,6 @@ class CameraSection(Section):
     @property
     def nominal_view(self) -> NominalView | None:
         """What is known of the image before the camera is open; None: nothing."""
-        return None
-
-    @property
-    def edge_tangents(self) -> tuple[float, float] | None:
-        """Tangents of the angles from the axis to the left and the right edge of the image, both positive.
-        None: known only once the camera is open."""
         return None
 
 
@@ -83,6 +78,11 @@ class ReplayCameraConfig(CameraSection):
             raise ValueError("gyro_topic has no effect with gyro: false; leave one out")
         return self
 
+    @property
+    def edge_tangents(self) -> None:
+        """See SimulatedCameraConfig: only the recording knows, once it is open."""
+        return None
+
 
 class RealsenseCameraConfig(CameraSection):
     """An Intel RealSense D435i, depth aligned to colour.
@@ -115,7 +115,7 @@ class RealsenseCameraConfig(CameraSection):
 
     @property
     def edge_tangents(self) -> tuple[float, float]:
-        """See CameraSection. Nominal values: the camera tells its own only once it runs."""
+        """See SimulatedCameraConfig. Nominal values: the camera tells its own only once it runs."""
         half = 0.5 * min(self.width / self.height, _D435I_ASPECT) / _D435I_FOCAL
         return half, half
 
@@ -163,7 +163,7 @@ class SimulatedCameraConfig(CameraSection):
 
     @property
     def edge_tangents(self) -> tuple[float, float]:
-        """See CameraSection."""
+        """Tangents of the angles from the axis to the left and the right edge of the image, both positive."""
         return (self.cx + 0.5) / self.fx, (self.width - 0.5 - self.cx) / self.fx
 
     @property
