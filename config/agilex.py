@@ -17,7 +17,9 @@ NO_SERIAL: Mapping[AgilexModelName, str] = MappingProxyType(
     }
 )
 
-# What a model makes; where the numbers are from: hal/chassis/agilex_models.py.
+# What a model makes, and how fast it turns at most, at any speed: by the vendor's SDK (robot_limits) for
+# BUNKER, SCOUT and SCOUT MINI. For BUNKER MINI and BUNKER PRO no limits were found: theirs are what the
+# paper's task needs.
 AGILEX_TOP_SPEED_MPS: Mapping[AgilexModelName, float] = MappingProxyType(
     {
         "bunker": 3.0,
@@ -29,7 +31,6 @@ AGILEX_TOP_SPEED_MPS: Mapping[AgilexModelName, float] = MappingProxyType(
     }
 )
 
-# And how fast it turns at most, at any speed.
 AGILEX_TOP_YAW_RATE_RADPS: Mapping[AgilexModelName, float] = MappingProxyType(
     {
         "bunker": 2.5235,

@@ -18,13 +18,15 @@ from config.chassis import ChassisConfig
 from config.chassis_checks import check_protocol, check_top_speed, check_turns
 from config.decision import DecisionConfig
 from config.governor import GovernorConfig
-from config.loader import Section, load, read_yaml, resolve
+from config.loader import CONFIG_DIR, Section, load, read_yaml, resolve
 from config.own_parts import OwnPart, check_own_parts
 from config.path import PathSpec
 from config.perception import PerceptionConfig
 from config.plant import PlantConfig
 from config.robot import Robot
 
+# Every base that can be emulated, as in hil_file.
+HIL_BASES = tuple(sorted(path.stem.removeprefix("hil-") for path in CONFIG_DIR.glob("hil-*.yaml")))
 # Keys that a robot with a real camera must give; in a simulation each has a default.
 _OF_A_REAL_ROBOT = {
     "body": ("width_m", "length_m", "rear_m", "height_m"),
@@ -261,6 +263,11 @@ class ReplayConfig(Section):
         _check_speeds(self.robot, self.perception)
         _check_range(self.perception, self.decision)
         return self
+
+
+def hil_file(base: str) -> Path:
+    """The YAML that ships of a mission with this emulated base."""
+    return CONFIG_DIR / f"hil-{base}.yaml"
 
 
 def load_replay(path: Path) -> ReplayConfig:

@@ -28,9 +28,9 @@ class Window(Section):
             raise ValueError(f"end_s ({self.end_s:g}) must be more than start_s ({self.start_s:g})")
         return self
 
-    def contains(self, t_s: float) -> bool:
-        """Whether t_s lies in the window."""
-        return self.start_s <= t_s < self.end_s
+    def contains(self, t_s: float, after_s: float = 0.0) -> bool:
+        """Whether t_s lies in the window, or within after_s behind its end."""
+        return self.start_s <= t_s < self.end_s + after_s
 
 
 class LateWindow(Window):
@@ -91,14 +91,14 @@ class Faults(Section):
         """Since when the camera has shown nothing new at t_s, or within after_s before t_s; None if it does
         show new images then."""
         for window in (*self.no_frames, *self.frozen_frames):
-            if window.start_s <= t_s < window.end_s + after_s:
+            if window.contains(t_s, after_s):
                 return window.start_s
         return None
 
     def demands_stop(self, t_s: float, after_s: float) -> bool:
         """Whether a fault that must lead to a stop holds at t_s, or did within after_s before t_s."""
         windows = (*self.no_frames, *self.frozen_frames, *self.late_frames)
-        if any(window.start_s <= t_s < window.end_s + after_s for window in windows):
+        if any(window.contains(t_s, after_s) for window in windows):
             return True
         return self.feedback_lost_s is not None and t_s >= self.feedback_lost_s
 

@@ -22,6 +22,7 @@ _ANOTHER_KIND = 3
 # Replacements for messages in which pydantic speaks of itself instead of the file.
 _IN_OTHER_WORDS = {
     "union_tag_not_found": "its key kind is missing",
+    "union_tag_invalid": "its {discriminator} is {tag!r}, which is none of {expected_tags}",
     "tuple_type": "Input should be a list",
     "model_type": "Input should be keys and values",
     "model_attributes_type": "Input should be keys and values",
@@ -29,8 +30,6 @@ _IN_OTHER_WORDS = {
     "too_long": "the list must hold at most {max_length}, found {actual_length}",
     "invalid_key": "a key must be a word; a decimal has a point, not a comma",
 }
-
-
 # Errors of a number outside its bounds, and units by the ending of a key: a wrong unit is the usual cause.
 _BOUNDS = frozenset({"less_than", "less_than_equal", "greater_than", "greater_than_equal"})
 _UNITS = {
@@ -61,7 +60,6 @@ class Section(BaseModel):
 
 
 SectionT = TypeVar("SectionT", bound=Section)
-
 
 _MERGE = "tag:yaml.org,2002:merge"
 # What PyYAML raises, without naming the place, for a scalar that its tag does not allow: day 32, 5000 digits.
@@ -164,30 +162,32 @@ def describe(error: ValidationError, model: type[BaseModel], content: object = N
         item = whose(content, detail["loc"])
         if key and item:
             key += f" ({item})"
-        reason = detail["msg"].removeprefix("Value error, ")
-        if detail["type"] in _IN_OTHER_WORDS:
-            reason = _IN_OTHER_WORDS[detail["type"]].format(**detail.get("ctx", {}))
-        if detail["type"] == "union_tag_invalid":
-            reason = "its {discriminator} is {tag!r}, which is none of {expected_tags}".format(
-                **detail["ctx"]
-            )
+        reason = _reason(detail, key)
         if unknown:
             hint = advice(model, detail["loc"])
             # Several unknown keys of one section: list the known ones only once.
             reason = "unknown key" if hint in told else f"unknown key; {hint}"
             told.add(hint)
-        elif detail["type"] == "missing":
-            reason = "missing key"
-        elif not isinstance(detail["input"], dict | list):
-            found = detail["input"]
-            shown = str(found) if isinstance(found, date) else repr(found)
-            reason = f"{reason}, found {shown}" + _what_to_write(detail)
-            if detail["type"] in _BOUNDS and (unit := _unit_of(key)):
-                reason += f" {unit}"
         parts.append(f"{key}: {reason}" if key else reason)
     if len(parts) > _MOST_MISTAKES:
         parts[_MOST_MISTAKES:] = [f"and {len(parts) - _MOST_MISTAKES} more mistakes"]
     return "; ".join(parts)
+
+
+def _reason(detail: ErrorDetails, key: str) -> str:
+    """What is wrong with the value of key, and what was found."""
+    kind, context, found = detail["type"], detail.get("ctx", {}), detail["input"]
+    reason = detail["msg"].removeprefix("Value error, ")
+    if kind == "missing":
+        return "missing key"
+    if kind in _IN_OTHER_WORDS:
+        reason = _IN_OTHER_WORDS[kind].format(**context)
+    if isinstance(found, dict | list):
+        return reason
+    shown = str(found) if isinstance(found, date) else repr(found)
+    reason = f"{reason}, found {shown}{_what_to_write(detail)}"
+    unit = _unit_of(key) if kind in _BOUNDS else ""
+    return f"{reason} {unit}" if unit else reason
 
 
 def _is_in(inner: ErrorDetails, outer: ErrorDetails) -> bool:

@@ -21,6 +21,7 @@ class DepthNoise(Section):
 
 
 TYPICAL_DEPTH_NOISE = DepthNoise()
+IMPLAUSIBLE_SPEED_FACTOR = 1.6  # times the maximum speed of an obstacle: faster measured speeds are mistakes
 
 
 class FragmentSettings(Section):
@@ -120,6 +121,11 @@ class MotionSettings(Section):
     sigmas: float = Field(
         default=4.0, ge=1, le=10, description="how many standard deviations from zero a moving speed must be"
     )
+
+    @property
+    def implausible_mps(self) -> float:
+        """No obstacle is faster: a greater measured speed is a mistake."""
+        return IMPLAUSIBLE_SPEED_FACTOR * self.max_speed_mps
 
 
 class PerceptionConfig(Section):

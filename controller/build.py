@@ -190,9 +190,9 @@ def open_simulated_camera(
         config.camera,
         mount_of(config.robot),
         clock,
-        lambda stamp_ns: body_pose(stamp_ns) or start,
-        start_ns,
-        () if config.simulation is None else config.simulation.own_parts,
+        body_pose=lambda stamp_ns: body_pose(stamp_ns) or start,
+        start_ns=start_ns,
+        own_parts=() if config.simulation is None else config.simulation.own_parts,
     )
 
 
@@ -226,13 +226,13 @@ def build_world(config: AppConfig) -> World:
 def video_settings(config: AppConfig) -> VideoSettings:
     """What a video shows around the observations."""
     return VideoSettings(
-        mount_of(config.robot),
-        config.robot.body,
-        config.robot.body.width_m / 2.0 + config.decision.margins.lateral_m,
-        _fps(config),
-        config.robot.limits.max_speed_mps,
-        config.perception.max_depth_m,
-        config.camera.own_parts,
+        mount=mount_of(config.robot),
+        body=config.robot.body,
+        corridor_half_width_m=config.robot.body.width_m / 2.0 + config.decision.margins.lateral_m,
+        fps=_fps(config),
+        top_speed_mps=config.robot.limits.max_speed_mps,
+        range_m=config.perception.max_depth_m,
+        own_parts=config.camera.own_parts,
     )
 
 

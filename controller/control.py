@@ -114,9 +114,17 @@ class ControlLoop(DriveLoop):
         state = self._base.finish_step(setpoint, now_ns, zero=unanswered != "", arrived=arrived)
         scene_ns = None if scene is None else scene.captured_ns
         return ControlStep(
-            now_ns, pose, on_path.s_m, on_path.d_m, scene_ns, decision, setpoint, state,
-            fault=fault, unanswered=unanswered,
-        )  # fmt: skip
+            now_ns=now_ns,
+            pose=pose,
+            progress_m=on_path.s_m,
+            lateral_m=on_path.d_m,
+            scene_ns=scene_ns,
+            decision=decision,
+            setpoint=setpoint,
+            chassis=state,
+            fault=fault,
+            unanswered=unanswered,
+        )
 
     def _setpoint(
         self, decision: Decision, on_path: OnPath, cap: SpeedCap, now_ns: int

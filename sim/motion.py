@@ -40,7 +40,7 @@ class MotionState:
 
 @dataclass(frozen=True, slots=True)
 class _Leg:
-    """A straight run between two points.
+    """A straight run between two points, or without a length a place to stand or to turn on the spot.
 
     turn_in_rad, turn_out_rad: half of the corner at its beginning and at its end, if that is rounded, else 0.
     """
@@ -48,10 +48,10 @@ class _Leg:
     x_m: float
     y_m: float
     heading_rad: float
-    length_m: float
-    cruise_mps: float
-    turn_in_rad: float
-    turn_out_rad: float
+    length_m: float = 0.0
+    cruise_mps: float = 0.0
+    turn_in_rad: float = 0.0
+    turn_out_rad: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,13 +99,13 @@ class Trajectory:
         else:
             heading, yaw_rate = _rounded_heading(leg, along_m, speed)
         return MotionState(
-            leg.x_m + along_m * c,
-            leg.y_m + along_m * s,
-            wrap_angle_rad(heading),
-            speed * c,
-            speed * s,
-            yaw_rate,
-            phase.distance_before_m + travelled_m,
+            x_m=leg.x_m + along_m * c,
+            y_m=leg.y_m + along_m * s,
+            heading_rad=wrap_angle_rad(heading),
+            vx_mps=speed * c,
+            vy_mps=speed * s,
+            yaw_rate_radps=yaw_rate,
+            distance_m=phase.distance_before_m + travelled_m,
         )
 
     def sample(self, times_s: FloatArray) -> FloatArray:
@@ -168,14 +168,28 @@ class Trajectory:
         self._add_standstill(self._cursor.heading_rad)
 
     def _add_standstill(self, heading_rad: float) -> None:
-        leg = _Leg(self._cursor.x_m, self._cursor.y_m, heading_rad, 0.0, 0.0, 0.0, 0.0)
-        self._add(leg, 0.0, 0.0, 0.0, 0.0)
+        self._add(_Leg(self._cursor.x_m, self._cursor.y_m, heading_rad))
 
-    def _add(self, leg: _Leg, along_m: float, speed: float, accel: float, yaw_rate: float) -> None:
-        heading = self._cursor.heading_rad
-        self._phases.append(
-            _Phase(self._time_s, leg, along_m, speed, accel, yaw_rate, heading, self._distance_m)
+    def _add(
+        self,
+        leg: _Leg,
+        along_m: float = 0.0,
+        speed_mps: float = 0.0,
+        accel_mps2: float = 0.0,
+        yaw_rate_radps: float = 0.0,
+    ) -> None:
+        """Add a phase that begins now."""
+        phase = _Phase(
+            start_s=self._time_s,
+            leg=leg,
+            along_m=along_m,
+            speed_mps=speed_mps,
+            accel_mps2=accel_mps2,
+            yaw_rate_radps=yaw_rate_radps,
+            heading_rad=self._cursor.heading_rad,
+            distance_before_m=self._distance_m,
         )
+        self._phases.append(phase)
 
     def _add_run(self, run: list[Go], motion: MotionPlan) -> None:
         legs = self._legs(run)
@@ -206,8 +220,8 @@ class Trajectory:
     def _turn_to(self, leg: _Leg, turn_rate_radps: float) -> None:
         turn = wrap_angle_rad(leg.heading_rad - self._cursor.heading_rad)
         if abs(turn) > 1e-6:
-            spot = _Leg(leg.x_m, leg.y_m, leg.heading_rad, 0.0, 0.0, 0.0, 0.0)
-            self._add(spot, 0.0, 0.0, 0.0, math.copysign(turn_rate_radps, turn))
+            spot = _Leg(leg.x_m, leg.y_m, leg.heading_rad)
+            self._add(spot, yaw_rate_radps=math.copysign(turn_rate_radps, turn))
             self._time_s += abs(turn) / turn_rate_radps
         self._cursor = PlanarPose(leg.x_m, leg.y_m, leg.heading_rad)
 
@@ -223,7 +237,7 @@ class Trajectory:
         ):
             if duration_s > 1e-12:
                 self._distance_m = start_m + along_m
-                self._add(leg, along_m, speed, rate, 0.0)
+                self._add(leg, along_m, speed, rate)
                 self._time_s += duration_s
         self._distance_m = start_m + leg.length_m
         c, s = math.cos(leg.heading_rad), math.sin(leg.heading_rad)

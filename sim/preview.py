@@ -139,7 +139,7 @@ def _map(world: World, robot: Robot, pose: PlanarPose, t_s: float) -> ColourImag
     room = world.scenario.room
     width, height = _MAP_PX
     scale = min(width / (room.x_max_m - room.x_min_m), height / (room.y_max_m - room.y_min_m))
-    plan = np.full((height, width, 3), 235, np.uint8)
+    plan = np.full((height, width, 3), _PAPER, np.uint8)
 
     def pixels(points: NDArray[np.float64]) -> NDArray[np.int32]:
         u = (points[:, 0] - room.x_min_m) * scale
@@ -178,7 +178,7 @@ def _routes(world: World) -> list[FloatArray]:
 
 def _map_key(width: int, px_per_m: float) -> ColourImage:
     """The scale of the map, and what its colours mean."""
-    key = np.full((_KEY_PX, width, 3), 235, np.uint8)
+    key = np.full((_KEY_PX, width, 3), _PAPER, np.uint8)
     length_m = next(m for m in (10, 5, 2, 1) if m * px_per_m < 0.3 * width or m == 1)
     cv2.line(key, (10, 12), (10 + round(length_m * px_per_m), 12), _INK, 3)
     x = 18 + round(length_m * px_per_m)

@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 from hal.records import record
 from hal.types import FloatArray, PlanarPose, Pose, Vector
 
-IMPLAUSIBLE_SPEED_FACTOR = 1.6  # times the maximum speed of an obstacle: faster measured speeds are mistakes
-
 
 @record(frozen=True, slots=True, eq=False)
 class Obstacle:

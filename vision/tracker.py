@@ -47,7 +47,7 @@ from vision.detection import Detection
 from vision.motion import least_squares, limbs
 from vision.motion.least_squares import BodyVelocities, FragmentVelocities
 from vision.percept import Percept
-from vision.scene import IMPLAUSIBLE_SPEED_FACTOR, CameraCondition, FreeSpace, Scene
+from vision.scene import CameraCondition, FreeSpace, Scene
 
 _ACCEL_DENSITY = 0.08  # (m/s^2)^2 s, as people start, stop and turn: a sigma of 0.28 m/s after 1 s
 # For so long after a frame in which few fragments fit one motion of the camera, the views before it may be
@@ -67,7 +67,7 @@ class Tracker:
         self._tracks = Tracks()
         self._free = ViewMemory(config.depth_noise)
         self._near_floor = NearFloor(config.min_depth_m)
-        self._rims = rim_motion.RimMemory(IMPLAUSIBLE_SPEED_FACTOR * config.motion.max_speed_mps)
+        self._rims = rim_motion.RimMemory(config.motion.implausible_mps)
         self._surfaces = masks.NO_TRACK_SURFACES
         self._fragment_ids = np.empty(0, np.int64)
         self._fragment_owner = np.empty(0, np.int64)
@@ -126,8 +126,7 @@ class Tracker:
         if detection.dt_s > 0:
             rim_motion.fuse(tracks, rims, detection.dt_s)
             approach.fuse(tracks, nearing, pose.translation_m, detection.dt_s)
-        max_mps = self._config.motion.max_speed_mps
-        sightings.forget_implausible(tracks, IMPLAUSIBLE_SPEED_FACTOR * max_mps, max_mps)
+        sightings.forget_implausible(tracks, self._config.motion)
         if tracks.overhead.any():
             tracks.overhead &= ~births.reaching_down(grid, whole, len(tracks), self._body_height_m)
         owner = adopt(tracks, detection, whole, owner, noise)

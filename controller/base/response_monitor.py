@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections import deque
 
-from hal.clocks import NS_PER_S
+from hal.clocks import NS_PER_MS, NS_PER_S
 from hal.records import record
 
 # Window beyond the base's lag in which it has to do part of the least speed that was commanded.
@@ -26,7 +26,7 @@ _FOLLOWS, _FELL, _CONTRADICTS = 0.6, 0.5, 0.4
 _BREAKS_LOOSE_MPS = 0.2
 # A dip: the base receives again before it has fallen that far. Its speed drops by this much within this time,
 # although no lower speed was commanded.
-_DIPS_MPS, _DIPS_NS = 0.1, 400_000_000
+_DIPS_MPS, _DIPS_NS = 0.1, 400 * NS_PER_MS
 # Too fast: above the greatest command of the last _LAG_NS by this share and this constant, as in
 # hal/chassis/following.py. The time covers any lag of a base.
 _LAG_NS = 6 * NS_PER_S

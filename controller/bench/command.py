@@ -153,8 +153,8 @@ def _simulated_reel_figures(config: AppConfig, plan: Plan, width: int, height: i
 
 def _recorded_reel_figures(plan: Plan) -> PerceptionFigures:
     replay = load_replay(_REPLAY)
-    camera, _ = open_replay(plan.recording, "none")
-    reel = recorded_reel(camera, camera.mount)
+    recording, _ = open_replay(plan.recording, "none")
+    reel = recorded_reel(recording)
     label = f"perception, recording {plan.recording.name}"
     return _reel_figures(label, reel, replay.perception, replay.robot.body, plan.recording_passes)
 

@@ -8,9 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from uuid import uuid4
 
-from config.app import AppConfig, load_app
+from config.app import HIL_BASES, AppConfig, hil_file, load_app
 from config.chassis import CanLinkConfig
-from config.loader import CONFIG_DIR
 from controller.bench.driving import TimedChassis, measure_exchange
 from controller.bench.figures import Durations
 from controller.bench.progress import progress
@@ -22,13 +21,14 @@ from controller.build_chassis import (
     build_serial_emulator,
 )
 from hal.api import Chassis
+from hal.clocks import NS_PER_MS
 from hal.errors import HalError
 from hal.types import PlanarPose
 from sim.plant import TrackedPlant
 from sim.simulation import Emulator
 
 _ORIGIN = PlanarPose(0.0, 0.0, 0.0)
-_PTY_DELAY_NS = 100_000  # within this time the kernel passes on the bytes of a pseudo-terminal
+_PTY_DELAY_NS = NS_PER_MS // 10  # within this time the kernel passes on the bytes of a pseudo-terminal
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,10 +84,10 @@ def wires() -> tuple[Wire, ...]:
         interface="udp_multicast", channel="239.74.163.90", port=20_000 + uuid4().int % 40_000
     )
     found = []
-    for file in sorted(path.stem.removeprefix("hil-") for path in CONFIG_DIR.glob("hil-*.yaml")):
+    for file in HIL_BASES:
         name = file.replace("-", "_")
         found.append(Wire(f"{name}_in_memory", file, _in_memory))
-        if isinstance(load_app(CONFIG_DIR / f"hil-{file}.yaml").chassis.link, CanLinkConfig):
+        if isinstance(load_app(hil_file(file)).chassis.link, CanLinkConfig):
             found.append(Wire(f"{name}_virtual_can", file, _on_bus(virtual)))
             found.append(Wire(f"{name}_multicast_can", file, _on_bus(multicast)))
         else:
@@ -99,7 +99,7 @@ def measure_exchanges(exchanges: int, stopwatch_ns: Callable[[], int]) -> dict[s
     """Durations by name of chassis and link. A link that this machine does not have is left out."""
     figures = {}
     for wire in wires():
-        config = load_app(CONFIG_DIR / f"hil-{wire.file}.yaml")
+        config = load_app(hil_file(wire.file))
         with progress(f"exchange, {wire.name.replace('_', ' ')}", exchanges) as tick:
             try:
                 figures[wire.name] = _measure(wire, config, exchanges, stopwatch_ns, tick)

@@ -32,7 +32,7 @@ from controller.terminal.outlet import say_result
 from hal.api import Clock
 from hal.clocks import NS_PER_MS, NS_PER_S, MonotonicClock
 
-PERIOD_NS = 20_000_000
+PERIOD_NS = 20 * NS_PER_MS
 _SETTLE_S = 2.0  # the first commands are not counted, until the processes have settled
 _START_ALLOWANCE_S = 8.0  # allowance for the start, on top of the measurement
 _SATURATION_FPS = 300.0  # fast enough that perception never waits for a frame

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from controller.path.path import Path
 from hal.api import FrameSource
+from hal.cameras.recording import Recording, frames_of
 from hal.clocks import NS_PER_S
-from hal.errors import EndOfStream
 from hal.geometry import camera_in_floor
 from hal.types import CameraMount, PlanarPose, Pose, RgbdFrame
 
@@ -43,12 +43,8 @@ def render_reel(camera: FrameSource, path: Path, mount: CameraMount, frames: int
     return Reel(tuple(frames_read), tuple(odometry), mount)
 
 
-def recorded_reel(camera: FrameSource, mount: CameraMount | None) -> Reel:
-    """All frames of a recording, without odometry. mount: None if it is not known."""
-    frames_read: list[RgbdFrame] = []
-    with camera:
-        while True:
-            try:
-                frames_read.append(camera.read(_TIMEOUT_S))
-            except EndOfStream:
-                return Reel(tuple(frames_read), (None,) * len(frames_read), mount)
+def recorded_reel(recording: Recording) -> Reel:
+    """All frames of a recording, without odometry."""
+    with recording:
+        frames = tuple(frames_of(recording))
+    return Reel(frames, (None,) * len(frames), recording.mount)

@@ -99,7 +99,7 @@ class DriveClearance:
     ) -> FloatArray:
         """Distances (T,). Where they are too large to matter, gap (the distance of the circles) is kept, or
         inf if something else is certainly nearer."""
-        near = np.flatnonzero(gap < max(min(self.min_distance_m, _FAR_M), min(exact_below_m, _FAR_M)))
+        near = np.flatnonzero(gap < min(max(self.min_distance_m, exact_below_m), _FAR_M))
         if not len(near):
             return gap
         robots, others = self._stage.robot_polygons(poses[near]), polygons[near]

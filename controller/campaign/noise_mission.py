@@ -150,13 +150,13 @@ class _NoiseDrive:
             self._camera_link.expose(t_s, pose, odometry_pose)
         return self._policy.step(
             Situation(
-                self._camera_link.newest_scene(t_s),
-                self._stage.path,
-                odometry_pose,
-                OnPath(odometry_s_m, offset_m, 0.0),
-                max(self._shaper.v_mps, self._base.speed_mps),
-                self._shaper.a_mps2,
-                round(t_s * NS_PER_S),
+                scene=self._camera_link.newest_scene(t_s),
+                path=self._stage.path,
+                pose=odometry_pose,
+                on_path=OnPath(odometry_s_m, offset_m, 0.0),
+                v_mps=max(self._shaper.v_mps, self._base.speed_mps),
+                a_mps2=self._shaper.a_mps2,
+                now_ns=round(t_s * NS_PER_S),
             )
         )
 

@@ -82,8 +82,8 @@ class NoisyCamera:
         return FreeSpace(
             planar_camera.bearing_tan,
             planar_camera.half_width_tan,
-            distances[0],
-            distances[1],
+            nearest_m=distances[0],
+            known_m=distances[1],
             floor_from_m=planar_camera.floor_from_m,
             up_tan=planar_camera.up_tan,
             blank=blank,

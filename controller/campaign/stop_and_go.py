@@ -130,10 +130,15 @@ def measure(recording: DriveRecording, robot: Robot, decision: DecisionConfig) -
     driving = _first_index(v >= DRIVING_MPS, 0)
     stop_due = _stop_due_step(free, needed_m, v, driving)
     if stop_due == len(v):
-        unknown = math.nan
-        false_stops = _standing_share(v[driving:])
-        return StopAndGo(unknown, unknown, unknown, unknown, starting_s, unknown, false_stops)
-    braking_s = _braking_s(times, v, stop_due, comfort)
+        return StopAndGo(
+            to_stop_s=math.nan,
+            braking_s=math.nan,
+            hold_share=math.nan,
+            to_resume_s=math.nan,
+            starting_s=starting_s,
+            to_decide_s=math.nan,
+            false_stop_share=_standing_share(v[driving:]),
+        )
     clear_step = _first_index(~np.isfinite(free) | (free > needed_m[stop_due] + 1.0), stop_due, min_run=1)
     stopped = _first_index(v <= STOPPED_MPS, stop_due)
     to_stop_s, hold = math.inf, 0.0
@@ -145,13 +150,13 @@ def measure(recording: DriveRecording, robot: Robot, decision: DecisionConfig) -
     stop_expected = np.zeros(len(v), np.bool_)
     stop_expected[stop_due : max(resumed, clear_step)] = True
     return StopAndGo(
-        to_stop_s,
-        braking_s,
-        hold,
-        _elapsed_s(times, clear_step, resumed),
-        starting_s,
-        _elapsed_s(times, clear_step, decided),
-        _standing_share(v[driving:], ~stop_expected[driving:]),
+        to_stop_s=to_stop_s,
+        braking_s=_braking_s(times, v, stop_due, comfort),
+        hold_share=hold,
+        to_resume_s=_elapsed_s(times, clear_step, resumed),
+        starting_s=starting_s,
+        to_decide_s=_elapsed_s(times, clear_step, decided),
+        false_stop_share=_standing_share(v[driving:], ~stop_expected[driving:]),
     )
 
 

@@ -1,14 +1,16 @@
-"""The command line. A user's mistake is one line on standard error and exit code 2, never a traceback."""
+"""The command line. A user's mistake is one line on standard error and exit code 2, never a traceback.
+
+The options of a command have the names of the fields of the record that is made of them.
+"""
 
 from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import click
 
-from config.camera import OdometryChoice
 from config.loader import CONFIG_DIR, ConfigError
 from controller.cli.measuring import bench, campaign, evaluate, faults, stop_and_go
 from controller.cli.options import (
@@ -97,17 +99,12 @@ def govern(options: MissionOptions) -> None:
 @config_option("of robot, perception and decision", CONFIG_DIR / "replay.yaml", "the replay.yaml that ships")
 @recording_options
 def replay(
-    recording: Path,
-    odometry: OdometryChoice,
     no_gyro: bool,
     colour_topic: str | None,
     depth_topic: str | None,
     odometry_topic: str | None,
     gyro_topic: str | None,
-    config_path: Path,
-    observations: Path | None,
-    video: Path | None,
-    quiet: bool,
+    **given: Any,
 ) -> None:
     """Perceive and decide on a recording, as the robot would.
 
@@ -119,9 +116,7 @@ def replay(
     from hal.cameras.bag_topics import WantedTopics
 
     topics = WantedTopics(colour_topic, depth_topic, odometry_topic, gyro_topic)
-    run_replay(
-        ReplayOptions(recording, odometry, config_path, observations, video, quiet, topics, not no_gyro)
-    )
+    run_replay(ReplayOptions(topics=topics, use_gyro=not no_gyro, **given))
 
 
 @cli.command()
@@ -148,15 +143,8 @@ def envelope(config_path: Path) -> None:
 @click.option("--interface", help="CAN: another python-can interface than the channel suggests.")
 @click.option("--port", type=WholeNumber(1024, 65535), help="CAN over multicast: the UDP port.")
 @config_option("whose chassis and simulation.plant are emulated", None, "the hil-KIND.yaml that ships")
-@click.option("--tell", is_flag=True, help="Print the motion of the base ten times per second.")
-def emulate(
-    kind: str,
-    channel: str | None,
-    interface: str | None,
-    port: int | None,
-    config_path: Path | None,
-    tell: bool,
-) -> None:
+@click.option("--tell", "telling", is_flag=True, help="Print the motion of the base ten times per second.")
+def emulate(**given: Any) -> None:
     """Emulate a tracked base, in real time, until SIGTERM.
 
     Drive it with `treadwatch run --config config/hil-KIND.yaml`.
@@ -165,7 +153,7 @@ def emulate(
     """
     from controller.cli.emulate import EmulateOptions, run_emulator
 
-    run_emulator(EmulateOptions(kind, channel, interface, port, config_path, tell), sys.stdin)
+    run_emulator(EmulateOptions(**given), sys.stdin)
 
 
 for measuring in (bench, evaluate, campaign, stop_and_go, faults):

@@ -15,14 +15,14 @@ from typing import TextIO
 
 from pydantic import ValidationError
 
-from config.app import AppConfig, load_app
+from config.app import AppConfig, hil_file, load_app
 from config.chassis import (
     AgilexChassisConfig,
     AnyChassisConfig,
     CanLinkConfig,
     SerialLinkConfig,
 )
-from config.loader import CONFIG_DIR, describe
+from config.loader import describe
 from config.plant import PlantConfig
 from controller.build_chassis import build_can_emulator, build_pseudo_terminal, build_serial_emulator
 from controller.errors import UserError
@@ -70,7 +70,7 @@ class EmulateOptions:
 
 def run_emulator(options: EmulateOptions, commands: TextIO | None) -> None:
     """Run until SIGTERM or SIGINT. Raises ConfigError, HalError, UserError before it begins."""
-    config_path = options.config_path or CONFIG_DIR / f"hil-{options.kind}.yaml"
+    config_path = options.config_path or hil_file(options.kind)
     config = load_app(config_path)
     if config.chassis.kind != options.kind:
         raise UserError(f"{config_path}: its chassis is {config.chassis.kind!r}, not {options.kind!r}")

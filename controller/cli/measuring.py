@@ -1,15 +1,17 @@
-"""The commands that measure: the code's speed, detection, missions by the thousand, what breaks."""
+"""The commands that measure: the code's speed, detection, missions by the thousand, what breaks.
+
+The options of a command have the names of the fields of the record that is made of them.
+"""
 
 from __future__ import annotations
 
 import os
 import sys
 from pathlib import Path
-from typing import Literal
+from typing import Any
 
 import click
 
-from config.camera import OdometryChoice
 from controller.cli.options import (
     BASES,
     FILE,
@@ -80,17 +82,7 @@ def bench(json_path: Path | None, frames: int, period: bool, seconds: float) -> 
     help="Processes that share the simulated set.",
 )  # fmt: skip
 @no_progress_bar
-def evaluate(
-    recordings: tuple[Path, ...],
-    simulated: bool,
-    report: Path,
-    odometry: OdometryChoice,
-    static: bool,
-    baselines: Literal["none", "some", "all"],
-    only: tuple[str, ...],
-    workers: int,
-    quiet: bool,
-) -> None:
+def evaluate(**given: Any) -> None:
     """Measure detection, simulated with truth and on recordings.
 
     Writes a report: the paper's tables and figures. It names the goals that are missed; the exit code is 0
@@ -98,9 +90,15 @@ def evaluate(
     """
     from controller.evaluation.command import EvaluationOptions, run_evaluation
 
-    run_evaluation(
-        EvaluationOptions(recordings, simulated, report, odometry, static, baselines, only, workers, quiet)
-    )
+    run_evaluation(EvaluationOptions(**given))
+
+
+def _names(_context: click.Context, option: click.Parameter, text: str | None) -> tuple[str, ...]:
+    """Empty if the option was not given. Raises UserError if it was, and names nothing."""
+    names = tuple(name.strip() for name in (text or "").split(",") if name.strip())
+    if text is not None and not names:
+        raise UserError(f"{option.opts[0]} {text!r}: names nothing; leave the option out for all of them")
+    return names
 
 
 @click.command(cls=Command)
@@ -110,15 +108,16 @@ def evaluate(
     help="Number of missions, spread evenly over the families or scenarios, each with its own seeds.",
 )  # fmt: skip
 @click.option(
-    "--families",
-    metavar="A,B,...",
+    "--families", metavar="A,B,...", callback=_names,
     help="Scenario families. Default: all; with --scenario: none.",
-)
+)  # fmt: skip
 @click.option(
     "--scenario", "scenarios", multiple=True, metavar="FILE",
     help="A scenario file, or the name of one that ships, in place of the families; may be repeated.",
 )  # fmt: skip
-@click.option("--policies", metavar="A,B,...", help="ours, paper, zones, field. Default: all.")
+@click.option(
+    "--policies", metavar="A,B,...", callback=_names, help="ours, paper, zones, field. Default: all."
+)
 @perception_mode("noise")
 @click.option(
     "--workers", type=WholeNumber(1, 256), default=min(os.cpu_count() or 1, 8), show_default=True,
@@ -139,41 +138,14 @@ def evaluate(
     help="Camera mode: keep recordings and videos of failed missions; with --only, of that mission.",
 )  # fmt: skip
 @no_progress_bar
-def campaign(
-    config_path: Path,
-    missions: int,
-    families: str | None,
-    scenarios: tuple[str, ...],
-    policies: str | None,
-    mode: Literal["noise", "camera"],
-    workers: int,
-    seed: int,
-    report: Path | None,
-    resume: bool,
-    scheduler: str | None,
-    only: str | None,
-    video: bool,
-    quiet: bool,
-) -> None:
+def campaign(**given: Any) -> None:
     """Drive missions of all families with several policies.
 
     Exit code 1 if treadwatch's own policy failed a mission.
     """
     from controller.campaign.command import CampaignOptions, run_campaign
 
-    options = CampaignOptions(
-        config_path, missions, _names("--families", families), _names("--policies", policies), mode, workers,
-        seed, report, resume, scheduler, only, video, quiet, scenarios,
-    )  # fmt: skip
-    sys.exit(run_campaign(options))
-
-
-def _names(option: str, text: str | None) -> tuple[str, ...]:
-    """Empty if the option was not given. Raises UserError if it was, and names nothing."""
-    names = tuple(name.strip() for name in (text or "").split(",") if name.strip())
-    if text is not None and not names:
-        raise UserError(f"{option} {text!r}: names nothing; leave the option out for all of them")
-    return names
+    sys.exit(run_campaign(CampaignOptions(**given)))
 
 
 @click.command("stop-and-go", cls=Command)
@@ -187,15 +159,7 @@ def _names(option: str, text: str | None) -> tuple[str, ...]:
 )  # fmt: skip
 @click.option("--keep", is_flag=True, help="Camera mode: keep frames, observations and a video as well.")
 @no_progress_bar
-def stop_and_go(
-    config_path: Path,
-    drives: int,
-    seed: int,
-    mode: Literal["noise", "camera"],
-    report: Path,
-    keep: bool,
-    quiet: bool,
-) -> None:
+def stop_and_go(**given: Any) -> None:
     """Measure how the robot stops for a person and drives on.
 
     The person steps in, stands and leaves. The metrics are those of Nav2's collision monitor. Exit code 1 if
@@ -203,7 +167,7 @@ def stop_and_go(
     """
     from controller.campaign.stop_and_go_command import StopAndGoOptions, run_stop_and_go
 
-    sys.exit(run_stop_and_go(StopAndGoOptions(config_path, drives, seed, mode, report, keep, quiet)))
+    sys.exit(run_stop_and_go(StopAndGoOptions(**given)))
 
 
 @click.command(cls=Command)

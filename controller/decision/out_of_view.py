@@ -33,6 +33,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from config.perception import IMPLAUSIBLE_SPEED_FACTOR
 from controller.decision.bodies import Bodies, covering, no_bodies
 from controller.decision.leftover_strips import first_strips, leftover_strips
 from controller.decision.seen_through import SeenThrough, unproven
@@ -50,7 +51,7 @@ from controller.decision.view_edges import ViewEdges, out_of_view
 from hal.clocks import NS_PER_S
 from hal.compiled import compiled
 from hal.types import CameraMount, FloatArray, PlanarPose
-from vision.scene import IMPLAUSIBLE_SPEED_FACTOR, FreeSpace
+from vision.scene import FreeSpace
 
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.int64]

@@ -26,8 +26,8 @@ from controller.evaluation.scores.totals import ratio
 from controller.evaluation.types import FrameTruth
 from controller.perceive import Look
 from controller.replay.build import build_replay_perceiver
+from hal.cameras.recording import frames_of
 from hal.clocks import NS_PER_S
-from hal.errors import EndOfStream
 from vision.scene import CameraCondition
 
 MAX_PICTURES = 6
@@ -157,40 +157,38 @@ def evaluate_recording(
     perceiver = build_replay_perceiver(config, source.mount, poses, time.perf_counter_ns)
     tally = _Tally()
     with source:
-        while True:
-            try:
-                frame = source.read(timeout_s=0.0)
-            except EndOfStream:
-                break
+        for frame in frames_of(source):
             tally.add(name, perceiver.look(frame))
             on_frame()
     return RecordingRecord(
-        folder,
-        name,
-        "none" if poses is None else ("file" if odometry == "auto" else odometry),
-        static,
-        len(tally.stamps_ns),
-        len(source.skipped),
-        tally.seconds,
-        len(tally.track_ids),
-        tuple(sorted(identity for identity, count in tally.moving.items() if count >= WRONG_FRAMES)),
-        tally.frames_with_moving,
-        tuple(tally.ms),
-        {condition.value: count for condition, count in tally.conditions.items()},
-        dict(tally.ego_sources),
-        tally.pictures,
+        folder=folder,
+        name=name,
+        odometry="none" if poses is None else ("file" if odometry == "auto" else odometry),
+        static=static,
+        frames=len(tally.stamps_ns),
+        skipped=len(source.skipped),
+        seconds=tally.seconds,
+        objects=len(tally.track_ids),
+        moving_objects=tuple(
+            sorted(identity for identity, count in tally.moving.items() if count >= WRONG_FRAMES)
+        ),
+        frames_with_moving=tally.frames_with_moving,
+        ms=tuple(tally.ms),
+        conditions={condition.value: count for condition, count in tally.conditions.items()},
+        ego_sources=dict(tally.ego_sources),
+        pictures=tally.pictures,
     )
 
 
 def _snapshot(name: str, index: int, look: Look) -> Snapshot:
     stamp_s = look.scene.captured_ns / NS_PER_S
     return Snapshot(
-        name,
-        index,
-        look.frame.colour,
-        look.frame.depth.astype(np.float32) * np.float32(look.frame.depth_scale_m),
-        FrameTruth(stamp_s, ()),
-        tuple(detection_of(obstacle) for obstacle in look.scene.obstacles),
-        look.fragments,
-        FrameScore((), (), (), (), ()),
+        sequence=name,
+        index=index,
+        colour=look.frame.colour,
+        depth_m=look.frame.depth.astype(np.float32) * np.float32(look.frame.depth_scale_m),
+        truth=FrameTruth(stamp_s, ()),
+        detections=tuple(detection_of(obstacle) for obstacle in look.scene.obstacles),
+        fragments=look.fragments,
+        score=FrameScore((), (), (), (), ()),
     )

@@ -124,13 +124,13 @@ class _Recorder:
         worst = sorted(range(len(scores)), key=lambda index: (-scores[index].error_count, index))
         failing = _spaced([index for index in worst if scores[index].error_count > 0])
         return SequenceRecord(
-            self._sequence.name,
-            self._sequence.split,
-            tuple(self._truths),
-            records,
-            self._endpoint,
-            tuple(self._snapshot(index, records, scores[index]) for index in failing),
-            tuple(self._snapshot(index, records, scores[index]) for index in self._shown if scores),
+            name=self._sequence.name,
+            split=self._sequence.split,
+            truths=tuple(self._truths),
+            methods=records,
+            endpoint=self._endpoint,
+            failures=tuple(self._snapshot(index, records, scores[index]) for index in failing),
+            shown=tuple(self._snapshot(index, records, scores[index]) for index in self._shown if scores),
         )
 
     def _count_pixels(self, simulated: SimulatedFrame, answer: MethodOutput) -> PixelCounts:
@@ -167,16 +167,15 @@ class _Recorder:
         else:
             colour, fragments = np.asarray(cv2.imdecode(self._jpegs[index], cv2.IMREAD_COLOR), np.uint8), None
             depth_m = np.empty((0, 0), np.float32)
-        detections = records[OURS].answers[index].detections
         return Snapshot(
-            self._sequence.name,
-            index,
-            colour,
-            depth_m,
-            self._truths[index],
-            detections,
-            fragments,
-            frame_score,
+            sequence=self._sequence.name,
+            index=index,
+            colour=colour,
+            depth_m=depth_m,
+            truth=self._truths[index],
+            detections=records[OURS].answers[index].detections,
+            fragments=fragments,
+            score=frame_score,
         )
 
 

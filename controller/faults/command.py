@@ -8,10 +8,10 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from config.loader import CONFIG_DIR
+from config.app import HIL_BASES, hil_file
 from controller.errors import UserError
 from controller.faults.kills import KILLS, KillResult, run_kill
-from controller.faults.trials import FAULTS, KINDS, TrialResult, run_trial
+from controller.faults.trials import FAULTS, TrialResult, run_trial
 from controller.terminal.outlet import say, say_result
 
 HEADING = "## Faults"
@@ -36,7 +36,7 @@ def run_faults(options: FaultsOptions) -> None:
         # Reported now, not after minutes of measuring.
         raise UserError(f"{page}: may not be written; name a page in a folder that exists")
     trials = []
-    for kind in KINDS:
+    for kind in HIL_BASES:
         for fault in FAULTS:
             say(f"{kind}: {fault.name}", to_stderr=True)
             trials.append(run_trial(kind, fault))
@@ -44,7 +44,7 @@ def run_faults(options: FaultsOptions) -> None:
     for name in KILLS if options.kind is not None else ():
         assert options.kind is not None
         say(f"{options.kind}, processes: {name}", to_stderr=True)
-        kills.append(run_kill(options.kind, CONFIG_DIR / f"hil-{options.kind}.yaml", name))
+        kills.append(run_kill(options.kind, hil_file(options.kind), name))
     section = describe(trials, kills, options.kind)
     if options.into is not None:
         write_section(options.into, section)

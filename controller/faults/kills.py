@@ -89,7 +89,7 @@ class DriveProcesses:
             self.drive.wait(timeout_s)
 
     def wait_for_speed(self, condition: Callable[[float], bool], timeout_s: float) -> float:
-        """Read the base's output until reached() holds for its speed; gives the time that this took.
+        """Read the base's output until condition holds for its speed; gives the time that this took.
 
         Raises UserError if it takes longer than timeout_s.
         """
@@ -174,15 +174,14 @@ def run_kill(kind: str, config_path: Path, fault: str) -> KillResult:
     with _processes(kind, config_path) as processes:
         processes.wait_for_speed(lambda v_mps: v_mps > _DRIVING_MPS, _START_S)
         start_s = time.monotonic()
-        frozen = None
-        if fault == "perception frozen (SIGSTOP)":
-            frozen = processes.perception
-        KILLS[fault](processes)
+        inject = KILLS[fault]
+        frozen = processes.perception if inject is _freeze_perception else None
+        inject(processes)
         stood_s = None
-        if processes.base.poll() is None and KILLS[fault] is not _kill_base:
+        if processes.base.poll() is None and inject is not _kill_base:
             processes.wait_for_speed(lambda v_mps: v_mps < PLANT_REST_MPS, _STOP_S)
             stood_s = time.monotonic() - start_s
-        if KILLS[fault] is _kill_control:
+        if inject is _kill_control:
             return KillResult(fault, stood_s, None, None)
         if frozen is not None:
             # A mission with stale scenes stops and waits for new ones. That is measured, so end it.

@@ -9,16 +9,12 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from config.app import load_app
-from config.loader import CONFIG_DIR
+from config.app import hil_file, load_app
 from controller.build_chassis import build_base_in_memory
 from controller.shape import SpeedShaper
 from hal.clocks import NS_PER_S
 from hal.types import ChassisMode, ChassisState, PlanarPose, Setpoint
 from sim.plant import PLANT_REST_MPS, PLANT_REST_RADPS
-
-# Every base that can be emulated.
-KINDS = tuple(sorted(path.stem.removeprefix("hil-") for path in CONFIG_DIR.glob("hil-*.yaml")))
 
 _PERIOD_NS = NS_PER_S // 50
 _SPEED_MPS = 0.5
@@ -51,7 +47,7 @@ class TrialRig:
     """A guarded driver and its base, driven as by the control loop: shaped speeds while armed."""
 
     def __init__(self, kind: str) -> None:
-        config = load_app(CONFIG_DIR / f"hil-{kind}.yaml")
+        config = load_app(hil_file(kind))
         self.chassis, self.emulator, self.link = build_base_in_memory(config, PlanarPose(0.0, 0.0, 0.0), 0)
         self._shaper = SpeedShaper(config.robot.limits, _PERIOD_NS / NS_PER_S)
         self.now_ns = 0
@@ -114,8 +110,11 @@ class Fault:
     during: Callable[[TrialRig], None] = _keep_commanding
 
 
+# No fault, but what all others are compared with.
+_REQUESTED_STOP = Fault("stop is asked for", during=lambda rig: rig.step(0.0))
+
 FAULTS = (
-    Fault("stop is asked for", during=lambda rig: rig.step(0.0)),
+    _REQUESTED_STOP,
     Fault("e-stop", lambda rig: rig.emulator.press_estop(), lambda rig: rig.emulator.release_estop()),
     Fault("base restarts", lambda rig: rig.emulator.restart()),
     Fault("base frozen", lambda rig: rig.emulator.freeze(), lambda rig: rig.emulator.thaw()),
@@ -148,8 +147,7 @@ def run_trial(kind: str, fault: Fault) -> TrialResult:
         fault.during(rig)
         fault.end(rig)
         stood_m = rig.travelled_m
-        # The first entry is a requested stop and no fault, so nothing asks for a speed afterwards.
-        rig.run(_OBSERVATION_S, 0.0 if fault is FAULTS[0] else _SPEED_MPS)
+        rig.run(_OBSERVATION_S, 0.0 if fault is _REQUESTED_STOP else _SPEED_MPS)
         state = rig.state
         assert state is not None
         moved_m = rig.travelled_m - stood_m
@@ -157,5 +155,12 @@ def run_trial(kind: str, fault: Fault) -> TrialResult:
         rig.run(2.0, _SPEED_MPS)
         drives_again = drives_again and rig.emulator.plant.twist[0] > 0.2
     return TrialResult(
-        kind, fault.name, state.mode, state.reason, stood_s, travelled_m, moved_m, drives_again
+        kind=kind,
+        fault=fault.name,
+        mode=state.mode,
+        reason=state.reason,
+        stood_after_s=stood_s,
+        travelled_m=travelled_m,
+        moved_after_m=moved_m,
+        drives_again=drives_again,
     )

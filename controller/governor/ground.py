@@ -20,7 +20,7 @@ from config.robot import Robot
 from controller.decision.bodies import Bodies
 from controller.decision.surfaces import bands_at, floor_points, surfaces_of
 from controller.decision.view_edges import assumed_free_m
-from hal.clocks import NS_PER_S
+from hal.clocks import NS_PER_MS, NS_PER_S
 from hal.types import CameraMount, FloatArray, PlanarPose
 from vision.scene import FreeSpace
 
@@ -29,7 +29,7 @@ BoolArray = NDArray[np.bool_]
 
 CELL_M = 0.1
 # A surface marked within this time is in view; the decision knows it better than this grid.
-IN_VIEW_NS = 300_000_000
+IN_VIEW_NS = 300 * NS_PER_MS
 # Cells per side of the grid; what is farther away than half of it is forgotten.
 _SIZE = 128
 _LOOK_M = 4.0  # cells up to this distance ahead of the camera can be seen free

@@ -16,7 +16,6 @@ from controller.control import ControlStep
 from controller.decision.decision import Decision
 from controller.governor.governor import SpeedGovernor
 from controller.governor.inbox import RequestState
-from controller.record.recorder import path_ahead
 from hal.api import Chassis
 from hal.types import FloatArray, PlanarPose, Setpoint
 from vision.scene import Scene
@@ -60,19 +59,31 @@ class GovernorLoop(DriveLoop):
             # When the chassis follows setpoints again, shaping begins from standstill.
             self._governor.rest()
         governed = self._governor.step(
-            now_ns, scene, None if cap.zero_reason else asked.twist, pose, self._base.measured_mps,
-            cap.zero_reason or asked.silence, cap,
-        )  # fmt: skip
+            now_ns,
+            scene,
+            None if cap.zero_reason else asked.twist,
+            pose,
+            self._base.measured_mps,
+            silence=cap.zero_reason or asked.silence,
+            cap=cap,
+        )
         setpoint = Setpoint(now_ns, governed.v_mps, governed.a_mps2, governed.w_radps)
         state = self._base.finish_step(setpoint, now_ns, zero=cap.zero_reason != "")
         self._note_travel(pose)
         self._commands.tell(governed.v_mps, governed.w_radps, governed.decision, self._mode)
-        on_path = self._governor.on_path
-        scene_ns = None if scene is None else scene.captured_ns
         return ControlStep(
-            now_ns, pose, self._travelled_m, on_path.d_m, scene_ns, governed.decision, setpoint,
-            state, self._ahead(), governed.fault, cap.zero_reason,
-        )  # fmt: skip
+            now_ns=now_ns,
+            pose=pose,
+            progress_m=self._travelled_m,
+            lateral_m=self._governor.on_path.d_m,
+            scene_ns=None if scene is None else scene.captured_ns,
+            decision=governed.decision,
+            setpoint=setpoint,
+            chassis=state,
+            ahead_m=self._ahead(),
+            fault=governed.fault,
+            unanswered=cap.zero_reason,
+        )
 
     def _asked(self, now_ns: int) -> RequestState:
         """What the planner asks for; nothing while the drive ends or the chassis does not obey."""
@@ -102,4 +113,4 @@ class GovernorLoop(DriveLoop):
         path = self._governor.path
         if path is None:
             return None
-        return path_ahead(path, self._governor.on_path.s_m, path.pose(self._governor.on_path.s_m))
+        return path.ahead(self._governor.on_path.s_m, path.pose(self._governor.on_path.s_m))

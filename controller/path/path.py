@@ -20,7 +20,7 @@ from controller.path.path_pieces import pieces_of
 from controller.path.path_speeds import least_radius_m, section_speeds
 from controller.path.projection import Projection
 from hal.compiled import compiled
-from hal.geometry import wrap_angle_rad
+from hal.geometry import body_in_floor, wrap_angle_rad
 from hal.records import record
 from hal.types import FloatArray, PlanarPose
 
@@ -30,6 +30,9 @@ _NOW = np.zeros(1)
 # A pose is searched this far behind and ahead of where it was last.
 _LOOK_BACK_M = 0.25
 _LOOK_AHEAD_M = 2.0
+_SHOWN_M, _SHOWN_STEP_M = 12.0, 0.25  # of the path in pictures
+# (N, 2) in the body frame: the way of a robot that is shown to drive straight on, whatever its path.
+STRAIGHT_AHEAD_M = np.column_stack([np.linspace(0.0, 10.0, 41), np.zeros(41)])
 _OPPOSED_RAD = math.radians(120.0)  # headings that differ by more are opposed
 
 
@@ -77,6 +80,13 @@ class Path:
     def poses(self, s_m: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """x_m, y_m and heading_rad (not wrapped) of the path at s_m (S,), (S,) each."""
         return self.projection.poses(s_m)
+
+    def ahead(self, s_m: float, body: PlanarPose) -> FloatArray:
+        """(N, 2) points of the path from s_m on, in the body frame, for pictures."""
+        end_m = min(s_m + _SHOWN_M, self.length_m)
+        x_m, y_m, _ = self.poses(np.arange(s_m, end_m + _SHOWN_STEP_M, _SHOWN_STEP_M).clip(max=end_m))
+        floor = np.column_stack([x_m, y_m, np.zeros_like(x_m)])
+        return body_in_floor(body).inverse().apply(floor)[:, :2]
 
     def curvature(self, s_m: float) -> float:
         """Curvature in 1/m at s_m, positive to the left."""

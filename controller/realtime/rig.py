@@ -147,7 +147,16 @@ def realtime_rig(config: AppConfig, runner: RealtimeRunner, options: MissionOpti
             devices.enter_context(simulation)
         period_ns = round(NS_PER_S / runner.control_rate_hz)
         punctual = devices.enter_context(PunctualChassis(chassis, clock, period_ns))
-        yield RealtimeRig(config, runner, options, clock, start_ns, punctual, simulation, Punctuality())
+        yield RealtimeRig(
+            config=config,
+            runner=runner,
+            options=options,
+            clock=clock,
+            start_ns=start_ns,
+            chassis=punctual,
+            simulation=simulation,
+            punctuality=Punctuality(),
+        )
 
 
 def warn_of_cut_off(link: PerceptionLink, cut_off: list[str], console: Console, more: str = "") -> None:

@@ -9,8 +9,6 @@ from dataclasses import dataclass
 from os.path import realpath
 from pathlib import Path as FilePath
 
-import numpy as np
-
 from config.own_parts import OwnPart
 from config.robot import Body
 from controller.control import ControlStep
@@ -27,13 +25,7 @@ from controller.video.moment import VideoMoment
 from controller.video.pace import PacedVideo
 from controller.video.writer import VideoWriter
 from hal.cameras.tum_writer import TumWriter
-from hal.geometry import body_in_floor
-from hal.types import CameraMount, FloatArray, PlanarPose
-
-PATH_SHOWN_M = 12.0
-PATH_STEP_M = 0.25
-# (N, 2) in the body frame: the way of a robot that is shown to drive straight on, whatever its path.
-STRAIGHT_AHEAD_M = np.column_stack([np.linspace(0.0, 10.0, 41), np.zeros(41)])
+from hal.types import CameraMount, FloatArray
 
 # Frame rate of the video of a drive in real time: two cores that also perceive encode no more in VP8.
 MAX_REAL_TIME_FPS = 10.0
@@ -117,18 +109,18 @@ class Recorder:
         if video is not None and self._isolation.is_active(video):
             settings = self._settings
             moment = VideoMoment(
-                look.frame,
-                look.scene,
-                look.fragments,
-                decision,
-                commanded_mps,
-                measured_mps,
-                settings.mount,
-                settings.body,
-                path_ahead_m,
-                settings.corridor_half_width_m,
-                ending,
-                settings.own_parts,
+                frame=look.frame,
+                scene=look.scene,
+                fragments=look.fragments,
+                decision=decision,
+                commanded_mps=commanded_mps,
+                measured_mps=measured_mps,
+                mount=settings.mount,
+                body=settings.body,
+                path_ahead_m=path_ahead_m,
+                corridor_half_width_m=settings.corridor_half_width_m,
+                ending=ending,
+                own_parts=settings.own_parts,
             )
             with self._isolation.guard(video):
                 video.write(self._composer.compose(moment), look.frame.captured_ns)
@@ -217,7 +209,7 @@ class RunRecorder:
                 step.decision,
                 step.setpoint.v_mps,
                 step.chassis.v_mps,
-                path_ahead(self._path, step.progress_m, step.pose) if step.ahead_m is None else step.ahead_m,
+                self._path.ahead(step.progress_m, step.pose) if step.ahead_m is None else step.ahead_m,
             )
 
     def finish(self, ending: str = "drive ended") -> None:
@@ -237,12 +229,3 @@ class RunRecorder:
                 f"treadwatch: {self._undecided} frames were recorded without a decision: {reason}",
                 to_stderr=True,
             )
-
-
-def path_ahead(path: Path, progress_m: float, body: PlanarPose) -> FloatArray:
-    """(N, 2) points of the path from progress_m on, in the body frame."""
-    end_m = min(progress_m + PATH_SHOWN_M, path.length_m)
-    s_m = np.arange(progress_m, end_m + PATH_STEP_M, PATH_STEP_M).clip(max=end_m)
-    x_m, y_m, _ = path.poses(s_m)
-    floor = np.column_stack([x_m, y_m, np.zeros_like(x_m)])
-    return body_in_floor(body).inverse().apply(floor)[:, :2]

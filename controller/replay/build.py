@@ -57,12 +57,12 @@ def replay_video_settings(
 ) -> VideoSettings:
     """What a replay's video shows around the observations. fps: of the recording; None if not known."""
     return VideoSettings(
-        mount,
-        config.robot.body if mount is not None else None,
-        config.robot.body.width_m / 2.0 + config.decision.margins.lateral_m,
+        mount=mount,
+        body=config.robot.body if mount is not None else None,
+        corridor_half_width_m=config.robot.body.width_m / 2.0 + config.decision.margins.lateral_m,
         # Two decimal places: video containers count time in whole fractions of a second.
-        round(_replay_fps(fps), 2),
-        config.robot.limits.max_speed_mps,
-        config.perception.max_depth_m,
-        config.camera.own_parts,
+        fps=round(_replay_fps(fps), 2),
+        top_speed_mps=config.robot.limits.max_speed_mps,
+        range_m=config.perception.max_depth_m,
+        own_parts=config.camera.own_parts,
     )

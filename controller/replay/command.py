@@ -23,18 +23,18 @@ from controller.decision.decision import Decision
 from controller.decision.situation import Situation
 from controller.errors import UserError
 from controller.own_parts import require_own_parts_in_view
-from controller.path.path import OnPath, Path
+from controller.path.path import STRAIGHT_AHEAD_M, OnPath, Path
 from controller.perceive import Look
 from controller.record.observations import STANDARD_OUTPUT
-from controller.record.recorder import STRAIGHT_AHEAD_M, RecordingOptions, open_recorder, require_two_files
+from controller.record.recorder import RecordingOptions, open_recorder, require_two_files
 from controller.record.tally import ConditionTally, ObstacleTally, TimingTally
 from controller.replay.build import build_replay_decision, build_replay_perceiver, replay_video_settings
 from controller.terminal.console import Console
 from hal.cameras.bag_topics import WantedTopics
 from hal.cameras.gyro_track import GyroTrack
 from hal.cameras.pose_track import PoseTrack
+from hal.cameras.recording import frames_of
 from hal.clocks import NS_PER_S
-from hal.errors import EndOfStream
 from hal.geometry import mount_of
 from hal.types import CameraMount, Intrinsics, PlanarPose
 
@@ -103,11 +103,7 @@ def run_replay(options: ReplayOptions) -> None:
         recorder = devices.enter_context(
             open_recorder(recording, replay_video_settings(config, mount, source.fps))
         )
-        while True:
-            try:
-                frame = source.read(timeout_s=0.0)
-            except EndOfStream:
-                break
+        for frame in frames_of(source):
             look = perceiver.look(frame)
             v_mps = speed.step(look.scene.ego_motion)
             decision = _decide(decide, path, look, v_mps)

@@ -11,7 +11,7 @@ from controller.base.drive_lifecycle import Outcome
 from controller.control import ControlStep
 from controller.mission.result import DriveResult, MissionResult
 from controller.realtime.runner import Punctuality
-from controller.record.tally import SetpointTally, mean_speed_mps
+from controller.record.tally import FrameTally, SetpointTally, TimingTally, mean_speed_mps
 from controller.terminal.console import STUCK_S, Console
 from sim.simulation import Simulation
 
@@ -67,13 +67,18 @@ def drive_rows(config: AppConfig, result: DriveResult) -> list[tuple[str, str]]:
         rows.append(("shaper", result.shaper_faults.line()))
     if result.complaints.reported:
         rows.append(("base", result.complaints.line()))
-    rows.append(("perception", result.timing.line()))
-    if result.frames.line():
-        rows.append(("frames", result.frames.line()))
-    rows.extend(("cut off", reason) for reason in result.cut_off)
+    rows += perception_rows(result.timing, result.frames, result.cut_off)
     if result.punctuality is not None and result.punctuality.late_ns:
         rows.append(("control", _punctuality_text(result.punctuality)))
     return rows
+
+
+def perception_rows(timing: TimingTally, frames: FrameTally, cut_off: list[str]) -> list[tuple[str, str]]:
+    """How long perception took, which frames it has left out, and why outputs are not whole."""
+    rows = [("perception", timing.line())]
+    if frames.line():
+        rows.append(("frames", frames.line()))
+    return rows + [("cut off", reason) for reason in cut_off]
 
 
 def _punctuality_text(punctuality: Punctuality) -> str:

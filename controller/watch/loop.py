@@ -13,8 +13,7 @@ from controller.base.ego_speed import EgoSpeed
 from controller.base.localise import Localiser
 from controller.control import ControlStep, Decides
 from controller.decision.situation import Situation
-from controller.path.path import OnPath, Path
-from controller.record.recorder import STRAIGHT_AHEAD_M
+from controller.path.path import STRAIGHT_AHEAD_M, OnPath, Path
 from hal.api import ChassisListener
 from hal.clocks import NS_PER_S
 from hal.types import PlanarPose, Setpoint
@@ -80,9 +79,16 @@ class WatchLoop:
             Situation(scene, self._straight, _HERE, _AT_START, forward_mps, 0.0, now_ns)
         )
         self._end_when_due(now_ns)
-        nothing = Setpoint(now_ns, math.nan, math.nan, math.nan)
         return ControlStep(
-            now_ns, _HERE, 0.0, 0.0, self._scene_ns, decision, nothing, state, ahead_m=STRAIGHT_AHEAD_M
+            now_ns=now_ns,
+            pose=_HERE,
+            progress_m=0.0,
+            lateral_m=0.0,
+            scene_ns=self._scene_ns,
+            decision=decision,
+            setpoint=Setpoint(now_ns, math.nan, math.nan, math.nan),
+            chassis=state,
+            ahead_m=STRAIGHT_AHEAD_M,
         )
 
     def _take(self, scene: Scene, now_ns: int) -> None:

@@ -23,7 +23,15 @@ class NoBase:
 
     def listen(self, now_ns: int) -> ChassisState:
         """Everything unknown."""
-        nan = math.nan
         return ChassisState(
-            now_ns, ChassisMode.STANDBY, "there is no base", None, nan, nan, UNKNOWN, nan, (), None
+            stamp_ns=now_ns,
+            mode=ChassisMode.STANDBY,
+            reason="there is no base",
+            feedback_ns=None,
+            v_mps=math.nan,
+            w_radps=math.nan,
+            pose=UNKNOWN,
+            battery_v=math.nan,
+            faults=(),
+            sent=None,
         )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from config.app import AppConfig
+from controller.terminal.summary import perception_rows
 from controller.watch.loop import WatchLoop
 from controller.watch.result import WatchResult
 from controller.watch.view import base_text, floor_text, odometry_text
@@ -28,11 +29,7 @@ def summary_rows(config: AppConfig, loop: WatchLoop, result: WatchResult) -> lis
             rows.append(("turns", turns_text(result, loop.localiser.yaw_ratio, config.chassis.slip_factor)))
     if result.complaints.reported:
         rows.append(("reported", result.complaints.line()))
-    rows.append(("perception", result.timing.line()))
-    if result.frames.line():
-        rows.append(("frames", result.frames.line()))
-    rows.extend(("cut off", reason) for reason in result.cut_off)
-    return rows
+    return rows + perception_rows(result.timing, result.frames, result.cut_off)
 
 
 def _floor_text(config: AppConfig, result: WatchResult) -> str:

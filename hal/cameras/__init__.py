@@ -2,7 +2,7 @@
 
 realsense.py - an Intel RealSense D435i; realsense_sensors.py - the options of its sensors
 device_clock.py - maps the camera's clock to the monotonic clock
-recording.py - what every recording offers besides frames
+recording.py - what every recording offers besides frames, and its frames one after the other
 calibration.py - camera.yaml: intrinsics, scale, mount; rectifies raw images
 registration.py - registers depth to colour
 undistort.py - removes lens distortion

@@ -12,6 +12,8 @@ from __future__ import annotations
 import math
 import struct
 
+from hal.clocks import NS_PER_MS
+
 _DEVICE = "/device_"
 _DATA = ("/image/data", "/imu/data")
 _IMAGE = "sensor_msgs/msg/Image"
@@ -21,7 +23,6 @@ _LENGTH = struct.Struct("<I")
 _BYTES_BEFORE_FRAME_NAME, _BYTES_BEFORE_ENCODING, _BYTES_BEFORE_DATA = 12, 8, 5
 TRANSFORM = "geometry_msgs/msg/Transform"
 METADATA = "std_msgs/msg/String"
-_NS_PER_MS = 1_000_000
 
 
 def stream_of(topic: str) -> str | None:
@@ -71,7 +72,7 @@ def time_in_metadata(text: str) -> tuple[int, str] | None:
     except (KeyError, ValueError):
         return None
     return (
-        (round(time_ms * _NS_PER_MS), values.get("timestamp_domain", "")) if math.isfinite(time_ms) else None
+        (round(time_ms * NS_PER_MS), values.get("timestamp_domain", "")) if math.isfinite(time_ms) else None
     )
 
 

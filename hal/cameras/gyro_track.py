@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from hal.clocks import NS_PER_MS
 from hal.types import FloatArray, GyroSamples, RgbdFrame
 
 # Readings come every 2.5 to 10 ms. A frame without one this near was not covered by the gyro.
-_NEAR_NS = 25_000_000
+_NEAR_NS = 25 * NS_PER_MS
 
 
 class GyroTrack:

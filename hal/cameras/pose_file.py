@@ -29,7 +29,7 @@ _UNIT_TOLERANCE = 0.01
 class PoseFile(PoseTrack):
     """Poses from lines ``t tx ty tz qx qy qz qw``: the camera optical frame in the world."""
 
-    def __init__(self, path: Path, max_gap_s: float = 0.2) -> None:
+    def __init__(self, path: Path) -> None:
         """Read the file. Raises BadRecording with file and line if a value is not finite, a quaternion is not
         of unit length, or a time stands there twice."""
         rows: dict[int, FloatArray] = {}
@@ -46,7 +46,7 @@ class PoseFile(PoseTrack):
         stamps_ns = sorted(rows)
         values = np.stack([rows[stamp_ns] for stamp_ns in stamps_ns])
         attitudes = values[:, 3:] / np.linalg.norm(values[:, 3:], axis=1, keepdims=True)
-        super().__init__(path.name, stamps_ns, values[:, :3], attitudes, max_gap_s)
+        super().__init__(path.name, stamps_ns, values[:, :3], attitudes)
 
 
 def open_odometry(folder: Path, choice: OdometryChoice) -> PoseFile | None:

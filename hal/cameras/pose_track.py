@@ -8,9 +8,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hal.clocks import NS_PER_S
+from hal.clocks import NS_PER_MS
 from hal.types import FloatArray, Pose
 
+# Poses further apart than this are not interpolated: the motion between them would be a guess.
+_MAX_GAP_NS = 200 * NS_PER_MS
 # Below this angle sin(angle) / angle is 1 to the last digit, but the division would be by nearly zero.
 _SMALL_ANGLE_RAD = 1e-6
 
@@ -22,21 +24,14 @@ class PoseTrack:
     stamps_ns: N increasing times.
     positions_m: (N, 3).
     quaternions: (N, 4), qx qy qz qw, of unit length.
-    max_gap_s: greatest time between two poses that are interpolated.
     """
 
     def __init__(
-        self,
-        name: str,
-        stamps_ns: Sequence[int],
-        positions_m: FloatArray,
-        quaternions: FloatArray,
-        max_gap_s: float = 0.2,
+        self, name: str, stamps_ns: Sequence[int], positions_m: FloatArray, quaternions: FloatArray
     ) -> None:
         self.name = name
         self._stamps_ns = stamps_ns
         self._positions_m, self._quaternions = positions_m, quaternions
-        self._max_gap_ns = round(max_gap_s * NS_PER_S)
 
     def __len__(self) -> int:
         return len(self._stamps_ns)
@@ -44,8 +39,7 @@ class PoseTrack:
     def camera_pose(self, stamp_ns: int) -> Pose | None:
         """The pose at stamp_ns, interpolated between its neighbours: position linearly, rotation by slerp.
 
-        None before the first pose, after the last, and between two poses that are further apart than
-        max_gap_s.
+        None before the first pose, after the last, and between two poses that are too far apart.
         """
         after = bisect_right(self._stamps_ns, stamp_ns)
         if after == 0:
@@ -54,7 +48,7 @@ class PoseTrack:
         start_ns = self._stamps_ns[before]
         if start_ns == stamp_ns:
             return self._pose(self._positions_m[before], self._quaternions[before])
-        if after == len(self._stamps_ns) or self._stamps_ns[after] - start_ns > self._max_gap_ns:
+        if after == len(self._stamps_ns) or self._stamps_ns[after] - start_ns > _MAX_GAP_NS:
             return None
         fraction = (stamp_ns - start_ns) / (self._stamps_ns[after] - start_ns)
         position_m = (1.0 - fraction) * self._positions_m[before] + fraction * self._positions_m[after]

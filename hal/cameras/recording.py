@@ -1,13 +1,16 @@
-"""What every kind of recording offers besides its frames."""
+"""What every kind of recording offers besides its frames, and its frames one after the other."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Protocol
 
 from hal.api import FrameSource
 from hal.cameras.gyro_track import GyroTrack
-from hal.types import CameraMount
+from hal.errors import EndOfStream
+from hal.types import CameraMount, RgbdFrame
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,3 +60,10 @@ class Recording(FrameSource, Protocol):
     def notes(self) -> tuple[str, ...]:
         """Sentences for the summary: what was assumed, left out or put in order."""
         ...
+
+
+def frames_of(recording: Recording) -> Iterator[RgbdFrame]:
+    """The usable frames of an open recording, until it ends. Raises BadRecording if not one is usable."""
+    with suppress(EndOfStream):
+        while True:
+            yield recording.read(timeout_s=0.0)

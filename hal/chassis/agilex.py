@@ -73,10 +73,9 @@ class AgilexChassis(ChassisDriver):
         model = model_of(config)
         other_master = OtherMaster()
         feedback = AgilexFeedback(config, model, no_frames_hint, other_master)
-        # The model's limit applies to the commanded yaw rate, which is slip_factor times the real one.
         commands = CommandLimits(
-            max_speed_mps=model.max_speed_mps,
-            max_yaw_rate_radps=model.max_yaw_rate_radps / config.slip_factor,
+            max_speed_mps=config.top_speed_mps,
+            max_yaw_rate_radps=config.top_yaw_rate_radps(0.0),
             timeout_ns=config.command_timeout_ms * NS_PER_MS,
         )
         limits = ArmingLimits(

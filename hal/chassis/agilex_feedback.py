@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
+from config.agilex import AGILEX_TOP_YAW_RATE_RADPS
 from config.chassis import AgilexChassisConfig
 from hal.chassis.agilex_messages import (
     ActuatorSlow,
@@ -85,6 +86,8 @@ class AgilexFeedback:
         self._actuators = config.actuators or model.actuators
         self._no_frames_hint = no_frames_hint
         self._slip_factor = config.slip_factor
+        self._top_speed_mps = config.top_speed_mps
+        self._top_yaw_rate_radps = AGILEX_TOP_YAW_RATE_RADPS[config.model]
         width_m = track_width_of(config)
         self._geometry = None if width_m is None else TrackGeometry(width_m, config.slip_factor)
         self._max_gap_ns = config.feedback_timeout_ms * NS_PER_MS
@@ -268,9 +271,7 @@ class AgilexFeedback:
             return
         elapsed_s = 0.0 if self._odometer_ns is None else (now_ns - self._odometer_ns) / NS_PER_S
         self._odometer_ns = now_ns
-        max_track_mps = (
-            self._model.max_speed_mps + self._geometry.to_tracks(0.0, self._model.max_yaw_rate_radps)[1]
-        )
+        max_track_mps = self._top_speed_mps + self._geometry.to_tracks(0.0, self._top_yaw_rate_radps)[1]
         limit_mm = 1000.0 * (max_track_mps * elapsed_s + _JUMP_SLACK_M)
         # Of several odometer frames that arrive at once, each of the later ones still covers one period.
         left_mps, right_mps = self._geometry.to_tracks(self.v_mps, self.w_radps)

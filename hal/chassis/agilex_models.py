@@ -1,5 +1,5 @@
-"""The differences between AgileX models, as data. The manuals contradict each other, so models share a value
-only where a source says so.
+"""The differences between AgileX models, as data; their top speeds are in config/agilex.py. The manuals
+contradict each other, so models share a value only where a source says so.
 """
 
 from __future__ import annotations
@@ -8,7 +8,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
-from config.agilex import AGILEX_TOP_SPEED_MPS, AGILEX_TOP_YAW_RATE_RADPS
 from config.chassis import AgilexChassisConfig, SerialLinkConfig
 
 VEHICLE_NORMAL = 0
@@ -30,6 +29,11 @@ _DRIVER_NO_FAULTS = 0x40 | 0x80
 # 0x211 byte 1 as in the vendor's SDK.
 _SDK_MODES: Mapping[int, str] = MappingProxyType({0: "standby", 1: "CAN", 2: "serial", 3: "remote control"})
 
+# 0x211 bytes 4-5 of the models whose manual has the table.
+_SYSTEM_FAULTS: Mapping[int, str] = MappingProxyType(
+    {0x0100: "battery below 22 V", 0x0200: "battery low", 0x0400: "remote control lost"}
+)
+
 # The switch of the vendor's remote control: up is command mode, the middle is remote control (SCOUT MINI).
 # Remote control outranks 0x421 (BUNKER MINI manual p. 7, table 3.5).
 _REMOTE_RELEASE = "switch it to command mode (SWB up), or off"
@@ -37,7 +41,7 @@ _REMOTE_RELEASE = "switch it to command mode (SWB up), or off"
 
 @dataclass(frozen=True, slots=True)
 class AgilexModel:
-    """Limits, geometry, mode bytes and fault bits of one model.
+    """Geometry, mode bytes and fault bits of one model. Its top speeds: config/agilex.py.
 
     actuators: how many motors report (0x251+n, 0x261+n).
     mode_names: names of the values of 0x211 byte 1.
@@ -54,8 +58,6 @@ class AgilexModel:
     """
 
     name: str
-    max_speed_mps: float
-    max_yaw_rate_radps: float
     actuators: int = 2
     mode_names: Mapping[int, str] = field(default_factory=lambda: _SDK_MODES)
     mode_standby: int = 0
@@ -100,45 +102,21 @@ def _describe(bits: int, names: Mapping[int, str], what: str) -> tuple[str, ...]
     return tuple(found)
 
 
-# Limits: the vendor's SDK for BUNKER (robot_limits). The fault table was published only as pictures, so every
-# bit is reported by its number until it has been checked on a robot.
-BUNKER = AgilexModel(
-    name="bunker",
-    max_speed_mps=AGILEX_TOP_SPEED_MPS["bunker"],
-    max_yaw_rate_radps=AGILEX_TOP_YAW_RATE_RADPS["bunker"],
-)
+# The fault table was published only as pictures, so every bit is reported by its number until it has been
+# checked on a robot.
+BUNKER = AgilexModel(name="bunker")
 
-# BUNKER MINI manual pp. 7-9: CAN only; 0x421 every 20 ms, or the base leaves command mode after 500 ms. No
-# limits were found: these are what the paper's task needs.
-BUNKER_MINI = AgilexModel(
-    name="bunker_mini",
-    max_speed_mps=AGILEX_TOP_SPEED_MPS["bunker_mini"],
-    max_yaw_rate_radps=AGILEX_TOP_YAW_RATE_RADPS["bunker_mini"],
-    mode_serial=None,
-    mode_period_ms=20,
-)
+# BUNKER MINI manual pp. 7-9: CAN only; 0x421 every 20 ms, or the base leaves command mode after 500 ms.
+BUNKER_MINI = AgilexModel(name="bunker_mini", mode_serial=None, mode_period_ms=20)
 
-# BUNKER PRO 2.0: CAN only, 0x211 every 200 ms. No limits were found: as for BUNKER MINI.
-BUNKER_PRO = AgilexModel(
-    name="bunker_pro",
-    max_speed_mps=AGILEX_TOP_SPEED_MPS["bunker_pro"],
-    max_yaw_rate_radps=AGILEX_TOP_YAW_RATE_RADPS["bunker_pro"],
-    mode_serial=None,
-)
+# BUNKER PRO 2.0: CAN only, 0x211 every 200 ms.
+BUNKER_PRO = AgilexModel(name="bunker_pro", mode_serial=None)
 
-# SCOUT user manual v1.3.0: tables 3.2 and 3.9, section 1.2 (wheels 576 mm apart). Limits: the vendor's SDK.
+# SCOUT user manual v1.3.0: tables 3.2 and 3.9, section 1.2 (wheels 576 mm apart).
 SCOUT = AgilexModel(
     name="scout",
-    max_speed_mps=AGILEX_TOP_SPEED_MPS["scout"],
-    max_yaw_rate_radps=AGILEX_TOP_YAW_RATE_RADPS["scout"],
     actuators=4,
-    system_faults=MappingProxyType(
-        {
-            0x0100: "battery below 22 V",
-            0x0200: "battery low",
-            0x0400: "remote control lost",
-        }
-    ),
+    system_faults=_SYSTEM_FAULTS,
     driver_faults=MappingProxyType(
         {
             0x01: "supply voltage low",
@@ -152,30 +130,17 @@ SCOUT = AgilexModel(
     battery_low_v=22.5,
 )
 
-# Limits: the vendor's SDK. Its fault table was not found.
-SCOUT_MINI = AgilexModel(
-    name="scout_mini",
-    max_speed_mps=AGILEX_TOP_SPEED_MPS["scout_mini"],
-    max_yaw_rate_radps=AGILEX_TOP_YAW_RATE_RADPS["scout_mini"],
-    actuators=4,
-)
+# Its fault table was not found.
+SCOUT_MINI = AgilexModel(name="scout_mini", actuators=4)
 
 # TRACER user manual v1.2, tables 3.1 and 3.2: mode 0 is the remote control, and no value says standby. Its
 # serial line carries percentages.
 TRACER = AgilexModel(
     name="tracer",
-    max_speed_mps=AGILEX_TOP_SPEED_MPS["tracer"],
-    max_yaw_rate_radps=AGILEX_TOP_YAW_RATE_RADPS["tracer"],
     mode_names=MappingProxyType({0: "remote control or standby", 1: "CAN", 2: "serial"}),
     mode_serial=None,
     modes_remote=frozenset(),
-    system_faults=MappingProxyType(
-        {
-            0x0100: "battery below 22 V",
-            0x0200: "battery low",
-            0x0400: "remote control lost",
-        }
-    ),
+    system_faults=_SYSTEM_FAULTS,
     battery_low_v=22.5,
 )
 

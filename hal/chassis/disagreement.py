@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-_WINDOW_NS = 1_000_000_000
+from hal.clocks import NS_PER_S
+
+_WINDOW_NS = NS_PER_S
 
 
 class Disagreement:
@@ -30,8 +32,10 @@ class Disagreement:
         """Add a motion that the other sensor reported up to now_ns; once a second, compare the sums."""
         if self._window_start_ns is None:
             self.restart(now_ns)
+            self._measured = amount
+            return
         self._measured += amount
-        if self._window_start_ns is None or now_ns - self._window_start_ns < _WINDOW_NS:
+        if now_ns - self._window_start_ns < _WINDOW_NS:
             return
         difference = abs(self._measured - self._expected)
         self.sentence = (

@@ -12,6 +12,7 @@ yaw rate well above the commands of the last seconds. hal/chassis/driver.py step
 from __future__ import annotations
 
 import math
+import operator
 from collections import deque
 from typing import NamedTuple
 
@@ -52,6 +53,8 @@ _MIN_SPEED_SHARE, _MIN_SPEED_LESS_MPS, _SLOW_WINDOWS = 0.6, 0.03, 6
 _REST_NS = 8 * NS_PER_S
 _RESTING_EXTRA_MPS = 0.05
 
+_NOTHING_WRONG = (False, False, False)  # too fast, turns too fast, too slow: in one window
+
 
 class _Ordered(NamedTuple):
     """The magnitudes of speed and yaw rate that were commanded until until_ns."""
@@ -76,7 +79,7 @@ class Following:
         self._commanded_rad = self._turning_rad = self._reported_rad = 0.0
         self._orders: deque[_Ordered] = deque()
         self._window_began_ns, self._window_m, self._window_rad = 0, 0.0, 0.0
-        self._too_fast = self._turns_too_fast = self._too_slow = False
+        self._wrong_before = _NOTHING_WRONG
         self._min_command_mps = math.inf
         self._min_commands_mps: deque[float] = deque(maxlen=_SLOW_WINDOWS)
 
@@ -89,7 +92,7 @@ class Following:
             self.sentence = ""
             self._restart(now_ns)
             self._begin_window(now_ns)
-            self._too_fast = self._turns_too_fast = self._too_slow = False
+            self._wrong_before = _NOTHING_WRONG
             self._min_commands_mps.clear()
             return
         way_m = _way_m(before, pose)
@@ -147,12 +150,15 @@ class Following:
         recent = [one for one in self._orders if one.until_ns >= self._window_began_ns - _LAG_NS]
         mps, radps = max(one.mps for one in recent), max(one.radps for one in recent)
         slack_mps = _RESTING_EXTRA_MPS if resting else _MAX_EXTRA_MPS
-        before, self._too_fast = self._too_fast, reported_mps > _MAX_SHARE * mps + slack_mps
-        too_fast = before and self._too_fast
-        max_radps = _MAX_SHARE * radps + slack_mps / _ARM_M
-        before, self._turns_too_fast = self._turns_too_fast, reported_radps > max_radps
-        turns_too_fast = before and self._turns_too_fast
-        min_mps, too_slow = self._much_too_slow(reported_mps)
+        self._min_commands_mps.append(self._min_command_mps)
+        min_mps, full = min(self._min_commands_mps), len(self._min_commands_mps) == _SLOW_WINDOWS
+        wrong = (
+            reported_mps > _MAX_SHARE * mps + slack_mps,
+            reported_radps > _MAX_SHARE * radps + slack_mps / _ARM_M,
+            full and reported_mps < _MIN_SPEED_SHARE * min_mps - _MIN_SPEED_LESS_MPS,
+        )
+        too_fast, turns_too_fast, too_slow = map(operator.and_, self._wrong_before, wrong)
+        self._wrong_before = wrong
         self._begin_window(now_ns)
         stood = mps == 0.0 and radps == 0.0
         if too_fast:
@@ -160,15 +166,6 @@ class Following:
         if turns_too_fast:
             return _excess_text(f"{reported_radps:.2f} rad/s", f"{radps:.2f} rad/s", stood)
         return _shortfall_text(reported_mps, min_mps) if too_slow else ""
-
-    def _much_too_slow(self, reported_mps: float) -> tuple[float, bool]:
-        """The least command of the last windows, and whether the base reports much less."""
-        self._min_commands_mps.append(self._min_command_mps)
-        min_mps = min(self._min_commands_mps)
-        full = len(self._min_commands_mps) == _SLOW_WINDOWS
-        slow = full and reported_mps < _MIN_SPEED_SHARE * min_mps - _MIN_SPEED_LESS_MPS
-        before, self._too_slow = self._too_slow, slow
-        return min_mps, before and slow
 
     def _shortfall(self, seconds: float) -> str:
         """What is wrong if the base has moved too little or turned otherwise in these seconds, else ""."""

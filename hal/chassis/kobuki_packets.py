@@ -128,7 +128,17 @@ def _core(data: bytes) -> Core:
     clock, bumper, drop, cliff, left, right, _, _, _, charger, battery, over = struct.unpack(
         "<HBBBHHbbBBBB", data
     )
-    return Core(clock, bumper, drop, cliff, left, right, charger, battery / 10.0, over)
+    return Core(
+        clock_ms=clock,
+        bumper=bumper,
+        wheel_drop=drop,
+        cliff=cliff,
+        left_ticks=left,
+        right_ticks=right,
+        charger=charger,
+        battery_v=battery / 10.0,
+        over_current=over,
+    )
 
 
 def _inertia(data: bytes) -> Inertia:

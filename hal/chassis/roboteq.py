@@ -19,7 +19,7 @@ from hal.chassis.roboteq_feedback import RoboteqFeedback
 from hal.chassis.roboteq_lines import Query, Reply
 from hal.chassis.roboteq_port import RoboteqPort
 from hal.chassis.tracks import TrackGeometry
-from hal.clocks import NS_PER_MS
+from hal.clocks import NS_PER_MS, NS_PER_S
 from hal.errors import LinkLost
 from hal.types import ChassisMode, Setpoint
 
@@ -38,7 +38,7 @@ _OTHER_QUERIES = (
 )
 
 # A base that still moves after this time of zero commands does not follow them: !EX cuts the motors.
-_STOP_TIMEOUT_NS = 3_000 * NS_PER_MS
+_STOP_TIMEOUT_NS = 3 * NS_PER_S
 
 
 class RoboteqChassis(ChassisDriver):

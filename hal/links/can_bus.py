@@ -81,7 +81,7 @@ class CanBusLink(ReopeningLink[can.BusABC]):
                 if message is None and _has_more(bus):
                     continue
             except (can.CanError, OSError) as error:
-                if _is_foreign_datagram(error):
+                if _is_undecodable(error):
                     self._drop_partial(bus)
                     continue
                 raise self._mark_lost("receiving", error) from error
@@ -211,7 +211,7 @@ def _errno(error: BaseException | None) -> int | None:
     return None
 
 
-def _is_foreign_datagram(error: Exception) -> bool:
+def _is_undecodable(error: Exception) -> bool:
     """Whether the error only means that what arrived could not be decoded. Anybody may send to a group of
     udp_multicast, and the line of slcan has noise; neither is a fault of the bus."""
     cause = error.__cause__

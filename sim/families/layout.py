@@ -31,6 +31,7 @@ FRONT_M, HALF_WIDTH_M = 0.51, 0.39  # of the robot, from its turning centre
 _TOP_MPS, _ACCEL_MPS2 = 1.5, 0.3
 RACK_DEPTH_M = 1.1  # a pallet of 1.2 m is stored with some overhang
 BLEND_M = 0.8  # length of the blend at either end of a bend
+_DURATION_S = 70.0  # the longest aisle takes half of it without obstacles
 _BAY_M = 2.7  # a bay of a pallet rack: three pallets of 0.8 m side by side
 
 
@@ -167,7 +168,6 @@ def scenario(
     length_m: float,
     bodies: tuple[BodySpec, ...],
     *,
-    duration_s: float = 70.0,
     blocked: bool = False,
     path: PathSpec | None = None,
     room: Room | None = None,
@@ -175,7 +175,7 @@ def scenario(
     """A world. blocked: something never leaves the path."""
     return Scenario(
         name=name,
-        duration_s=duration_s,
+        duration_s=_DURATION_S,
         outcome="blocked" if blocked else "target",
         path=path or straight(length_m),
         room=room or hall(length_m),

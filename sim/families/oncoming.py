@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from config.scenario import MotionPlan, Scenario, Step
+from config.scenario import Scenario, Step
 from sim.families.layout import (
     HALF_WIDTH_M,
     Random,
@@ -107,12 +107,8 @@ def turns_back(random: Random) -> Scenario:
     if random.integers(2):
         steps += [wait(float(random.uniform(0.5, 2.0))), go(x + 0.3, on_path_y, speed), wait(1.0)]
         steps += [go(x + 0.6, side * 3.5, speed)]
-    obstacle = person(
-        random,
-        "person",
-        (x, side * 2.6),
-        MotionPlan(start_s=float(random.uniform(0.5, 4.0)), steps=tuple(steps)),
-    )
+    motion = walk(float(random.uniform(0.5, 4.0)), *steps)
+    obstacle = person(random, "person", (x, side * 2.6), motion)
     return scenario("turns_back", length, (*racks(random, length, ((x - 1.3, x + 1.8),)), obstacle))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from config.scenario import BodySpec, MotionPlan, Scenario
+from config.scenario import BodySpec, Scenario
 from sim.families.layout import (
     FRONT_M,
     Random,
@@ -69,15 +69,12 @@ def lead_brakes(random: Random) -> Scenario:
     length = float(random.uniform(14.0, 18.0))
     speed = float(random.uniform(0.5, 1.1))
     stop_x = float(random.uniform(6.0, 9.0))
-    motion = MotionPlan(
-        start_s=float(random.uniform(0.0, 1.0)),
-        accel_mps2=float(random.uniform(0.5, 1.0)),
-        turn_rate_degps=60.0,
-        steps=(
-            go(stop_x, 0.0, speed),
-            wait(float(random.uniform(1.0, 5.0))),
-            go(length + 6.0, 0.0, speed),
-        ),
+    start_s, accel_mps2 = float(random.uniform(0.0, 1.0)), float(random.uniform(0.5, 1.0))
+    steps = (
+        go(stop_x, 0.0, speed),
+        wait(float(random.uniform(1.0, 5.0))),
+        go(length + 6.0, 0.0, speed),
     )
+    motion = drive(start_s, *steps, accel_mps2=accel_mps2)
     lead = robot(random, "lead", (float(random.uniform(2.2, 3.5)), float(random.uniform(-0.1, 0.1))), motion)
     return scenario("lead_brakes", length, (*racks(random, length), lead))

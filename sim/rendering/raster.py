@@ -62,10 +62,7 @@ class Rasteriser:
         self._label = np.empty(shape[0] * shape[1], np.uint16)
         self._inside = np.empty(shape[0] * shape[1], np.bool_)
         self._condition = np.empty(shape[0] * shape[1], np.bool_)
-        k = intrinsics
-        self._pixel_to_ray = np.array(
-            [[1.0 / k.fx, 0.0, -k.cx / k.fx], [0.0, 1.0 / k.fy, -k.cy / k.fy], [0.0, 0.0, 1.0]]
-        )
+        self._pixel_to_ray = pixel_to_ray(intrinsics)
 
     def draw(self, geometry: Geometry, camera: Pose) -> Drawn:
         """Fill inverse_depth and labels with what camera (in the floor's frame) sees."""
@@ -167,6 +164,11 @@ def _inverse_depth_at_left(planes: FloatArray, spans: Spans) -> NDArray[np.float
     at_top = planes[:, 2] + planes[:, 0] * spans.bounds[:, 0]
     values: NDArray[np.float32] = (at_top[face] + planes[face, 1] * row).astype(np.float32)
     return values
+
+
+def pixel_to_ray(k: Intrinsics) -> FloatArray:
+    """The matrix (3, 3) from pixels (u, v, 1) to rays (x, y, 1) in the optical frame."""
+    return np.array([[1.0 / k.fx, 0.0, -k.cx / k.fx], [0.0, 1.0 / k.fy, -k.cy / k.fy], [0.0, 0.0, 1.0]])
 
 
 def texture_frames(corners: FloatArray) -> FloatArray:

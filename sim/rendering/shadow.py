@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from config.scenario import Light
 from hal.types import FloatArray, Intrinsics, Pose
-from sim.rendering.raster import Drawn, LabelImage, texture_frames
+from sim.rendering.raster import Drawn, LabelImage, pixel_to_ray, texture_frames
 from sim.rendering.spans import convert
 from sim.world import BUILDING_ID, BodyState, Geometry
 
@@ -48,10 +48,12 @@ class ShadowCaster:
             return
         corners = np.array([self._cached_patch(state) for state in near])
         corners = (corners - camera.translation_m) @ camera.rotation
-        k = self._intrinsics
-        bounds = convert(corners, k).bounds
-        to_ray = np.array([[1 / k.fx, 0, -k.cx / k.fx], [0, 1 / k.fy, -k.cy / k.fy], [0, 0, 1]])
-        to_patch = np.diag([_SIDE_PX, _SIDE_PX, 1.0]) @ np.linalg.inv(texture_frames(corners)) @ to_ray
+        bounds = convert(corners, self._intrinsics).bounds
+        to_patch = (
+            np.diag([_SIDE_PX, _SIDE_PX, 1.0])
+            @ np.linalg.inv(texture_frames(corners))
+            @ pixel_to_ray(self._intrinsics)
+        )
         on_floor = _floor_faces(drawn, geometry)
         for (u0, v0, u1, v1), matrix in zip(bounds.tolist(), to_patch, strict=True):
             if u1 <= u0:

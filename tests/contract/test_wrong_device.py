@@ -7,11 +7,9 @@ from itertools import permutations
 
 import pytest
 
-from config.app import load_app
+from config.app import HIL_BASES, hil_file, load_app
 from config.chassis import AnyChassisConfig, CanLinkConfig
-from config.loader import CONFIG_DIR
 from controller.build_chassis import build_serial_driver, build_serial_emulator
-from controller.faults.trials import KINDS as EVERY_BASE
 from hal.links.scripted import ScriptedSerialLink, serial_pair
 from hal.types import ChassisMode, ChassisState, Setpoint
 from sim.plant import TrackedPlant
@@ -22,10 +20,10 @@ GIVES_UP = "arming gave up after 3."
 
 
 def chassis_config(kind: str) -> AnyChassisConfig:
-    return load_app(CONFIG_DIR / f"hil-{kind}.yaml").chassis
+    return load_app(hil_file(kind)).chassis
 
 
-KINDS = [kind for kind in EVERY_BASE if not isinstance(chassis_config(kind).link, CanLinkConfig)]
+SERIAL_BASES = [kind for kind in HIL_BASES if not isinstance(chassis_config(kind).link, CanLinkConfig)]
 
 
 def emulator(kind: str, link: ScriptedSerialLink) -> Emulator:
@@ -47,7 +45,7 @@ def try_to_arm(kind: str, near: ScriptedSerialLink, base: Emulator | None) -> Ch
     return state
 
 
-@pytest.mark.parametrize(("kind", "other"), list(permutations(KINDS, 2)))
+@pytest.mark.parametrize(("kind", "other"), list(permutations(SERIAL_BASES, 2)))
 def test_another_kind_of_base_answers(kind: str, other: str) -> None:
     near, far = serial_pair()
     base = emulator(other, far)
@@ -58,15 +56,15 @@ def test_another_kind_of_base_answers(kind: str, other: str) -> None:
     assert base.plant.track_travel_m == (0.0, 0.0)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", SERIAL_BASES)
 def test_a_line_where_nobody_answers_is_told(kind: str) -> None:
     state = try_to_arm(kind, serial_pair()[0], None)
     assert state.reason.startswith(GIVES_UP)
     assert "not one byte came; check port, power" in state.reason
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_wrong_baud_rate(kind: str) -> None:
+@pytest.mark.parametrize("kind", SERIAL_BASES)
+def test_at_a_wrong_baud_rate_arming_gives_up_with_a_hint(kind: str) -> None:
     """Bits sampled at another rate: other bytes, of about the same number."""
     rng = random.Random(7)
     near, far = serial_pair()
@@ -81,7 +79,7 @@ def test_a_wrong_baud_rate(kind: str) -> None:
     assert base.plant.track_travel_m == (0.0, 0.0)
 
 
-def test_a_wrong_address() -> None:
+def test_a_base_at_another_address_is_silence_with_a_hint_to_the_address() -> None:
     near, far = serial_pair()
     config = chassis_config("roboclaw").model_copy(update={"address": 0x83})
     base = build_serial_emulator(config, far, TrackedPlant(PLANT))

@@ -9,14 +9,14 @@ from pathlib import Path
 
 import pytest
 
+from config.app import HIL_BASES
 from controller.faults.kills import KILLS, run_kill
-from controller.faults.trials import KINDS
 from tests.support.hil_missions import emulator, short_mission
 
 QUICK = "agilex"
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", HIL_BASES)
 def test_the_mission_is_reached(kind: str, tmp_path: Path, request: pytest.FixtureRequest) -> None:
     if kind != QUICK and not request.config.getoption("--hil"):
         pytest.skip("one kind is enough for every day; all of them with --hil")

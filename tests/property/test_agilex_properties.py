@@ -15,6 +15,7 @@ from tests.support.chassis_rig import (
     MS,
     agilex_config,
     check_state,
+    exchange_amid,
 )
 
 AGILEX_IDS = (
@@ -95,8 +96,6 @@ def test_agilex_serial_driver_survives_any_bytes(chunks: list[bytes]) -> None:
     link = ScriptedSerialLink()
     bus = agilex_serial.AgilexSerialBus(link)
     chassis = AgilexChassis(bus, agilex_config(SerialLinkConfig(url="loop://")), bus.silence_hint)
-    for k, chunk in enumerate(chunks, start=1):
-        link.deliver(chunk)
-        check_state(chassis.exchange(Setpoint(k * 20 * MS, 1.0, 0.0, 0.5), k * 20 * MS))
+    exchange_amid(chassis, link, chunks)
     motions = {data[5:-2] for data in link.written if data[3:5] == b"\x55\x01"}
     assert motions == ({bytes(6)} if chunks else set())

@@ -98,7 +98,9 @@ def test_slowing_and_its_inverse(v: float, end: float, limits: BrakeLimits) -> N
 
 
 @given(speeds, st.floats(0.01, 2.0), shares, limit_pairs)
-def test_faster_needs_more(v: float, more: float, share: float, limits: BrakeLimits) -> None:
+def test_a_faster_robot_needs_more_way_and_time_to_stop(
+    v: float, more: float, share: float, limits: BrakeLimits
+) -> None:
     a = share * limits.decel_mps2
     slow, fast = braking.stop(v, a, limits), braking.stop(v + more, a, limits)
     assert fast.distance_m > slow.distance_m

@@ -9,18 +9,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from config.decision import DecisionConfig
-from config.path import LineSpec, PathSpec
 from config.robot import Robot
 from controller.decision.decide import DecisionMaker
 from controller.decision.situation import Situation
-from controller.path.path import OnPath, Path
+from controller.path.path import OnPath
 from controller.shape import SpeedShaper
 from hal.types import CameraMount, PlanarPose
+from tests.support.floor_bodies import line_path
 from tests.support.scenes import STILL, free_space
 from vision.scene import CameraCondition, CameraHealth, Obstacle, Scene
 
 MOUNT = CameraMount(0.45, 0.0, 0.60, math.radians(4.0))
-PATH = Path(PathSpec(segments=(LineSpec(kind="line", length_m=20.0),)), Robot())
+PATH = line_path(20.0)
 PERIOD_NS = 20_000_000
 
 odd = st.sampled_from([math.nan, math.inf, -math.inf, 1e9, -1e9])

@@ -8,13 +8,12 @@ from hypothesis import strategies as st
 from hal.chassis import kobuki_packets
 from hal.chassis.kobuki import KobukiChassis
 from hal.links.scripted import ScriptedSerialLink
-from hal.types import Setpoint
 from sim.emulators.kobuki import KobukiEmulator
 from sim.plant import TrackedPlant
 from tests.support.chassis_rig import (
     KOBUKI_PLANT,
     MS,
-    check_state,
+    exchange_amid,
     kobuki_config,
 )
 
@@ -58,9 +57,7 @@ def test_kobuki_motion_keeps_its_direction_whatever_is_asked(v_mps: float, w_rad
 def test_kobuki_driver_survives_any_bytes(chunks: list[bytes]) -> None:
     link = ScriptedSerialLink()
     chassis = KobukiChassis(link, kobuki_config())
-    for k, chunk in enumerate(chunks, start=1):
-        link.deliver(chunk)
-        check_state(chassis.exchange(Setpoint(k * 20 * MS, 1.0, 0.0, 0.5), k * 20 * MS))
+    exchange_amid(chassis, link, chunks)
     assert set(link.written) <= {kobuki_packets.base_control(0.0, 0.0)}
 
 

@@ -10,8 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from hal.cameras.recording import frames_of
 from hal.cameras.tum_replay import TumReplay
-from hal.errors import BadRecording, EndOfStream
+from hal.errors import BadRecording
 from tests.support.recordings import write_recording
 
 FRAMES = 3
@@ -24,18 +25,13 @@ def faultless(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def replay(folder: Path) -> tuple[int, TumReplay] | BadRecording:
     """How many frames came, and the source with what it skipped; or why the recording is refused."""
-    count = 0
     try:
         with TumReplay(folder, read_ahead=0) as source:
-            while True:
-                frame = source.read(0.0)
-                assert frame.colour.shape == (48, 64, 3)
-                assert frame.depth.shape == (48, 64)
-                count += 1
-    except EndOfStream:
-        return count, source
+            frames = list(frames_of(source))
     except BadRecording as error:
         return error
+    assert all(frame.colour.shape == (48, 64, 3) and frame.depth.shape == (48, 64) for frame in frames)
+    return len(frames), source
 
 
 def files(folder: Path) -> list[Path]:

@@ -11,14 +11,13 @@ from hal.chassis import roboclaw_packets as packets
 from hal.chassis.roboclaw import RoboclawChassis
 from hal.chassis.roboclaw_port import RoboclawPort
 from hal.links.scripted import ScriptedSerialLink
-from hal.types import Setpoint
 from sim.emulators.roboclaw import RoboclawEmulator
 from sim.plant import TrackedPlant
 from tests.support.chassis_rig import (
     COUNTS_PER_M,
     MS,
     PLANT,
-    check_state,
+    exchange_amid,
     roboclaw_config,
 )
 
@@ -80,9 +79,7 @@ def test_roboclaw_port_survives_any_bytes_and_always_comes_to_rest(
 def test_roboclaw_driver_survives_any_bytes(chunks: list[bytes]) -> None:
     link = ScriptedSerialLink()
     chassis = RoboclawChassis(link, roboclaw_config())
-    for k, chunk in enumerate(chunks, start=1):
-        link.deliver(chunk)
-        check_state(chassis.exchange(Setpoint(k * 20 * MS, 1.0, 0.0, 0.5), k * 20 * MS))
+    exchange_amid(chassis, link, chunks)
 
 
 @settings(max_examples=50)

@@ -8,14 +8,13 @@ from hypothesis import strategies as st
 from hal.chassis import roboteq_lines as lines
 from hal.chassis.roboteq import RoboteqChassis
 from hal.links.scripted import ScriptedSerialLink
-from hal.types import Setpoint
 from sim.emulators.roboteq import RoboteqEmulator
 from sim.plant import TrackedPlant
 from tests.support.chassis_rig import (
     COUNTS_PER_M,
     MS,
     PLANT,
-    check_state,
+    exchange_amid,
     roboteq_config,
 )
 
@@ -58,9 +57,7 @@ def test_roboteq_motion_is_never_further_off_than_half_a_step_or_the_range(left:
 def test_roboteq_driver_survives_any_bytes(chunks: list[bytes]) -> None:
     link = ScriptedSerialLink()
     chassis = RoboteqChassis(link, roboteq_config())
-    for k, chunk in enumerate(chunks, start=1):
-        link.deliver(chunk)
-        check_state(chassis.exchange(Setpoint(k * 20 * MS, 1.0, 0.0, 0.5), k * 20 * MS))
+    exchange_amid(chassis, link, chunks)
     motions = {line for line in bytes(link.sent).split(b"\r") if line.startswith(b"!")}
     assert motions <= {b"!M 0 0"}, "nobody consented, whatever the line says"
 

@@ -28,7 +28,7 @@ from hal.chassis.kobuki_packets import WHEEL_BASE_M
 from hal.chassis.roboclaw import RoboclawChassis
 from hal.chassis.roboteq import RoboteqChassis
 from hal.links.can_bus import CanBusLink
-from hal.links.scripted import can_pair, serial_pair
+from hal.links.scripted import ScriptedSerialLink, can_pair, serial_pair
 from hal.types import ChassisMode, ChassisState, Setpoint
 from sim.emulators.agilex import AgilexEmulator
 from sim.emulators.kobuki import KobukiEmulator
@@ -259,6 +259,13 @@ def kobuki_rig(kind: str) -> Iterator[Rig]:
         # A spin is said as the speed of a wheel, in mm/s.
         step_radps = 0.001 / (0.5 * WHEEL_BASE_M)
         yield Rig(chassis, emulator, plug, own_timeout_s=0.6, battery_v=16.2, wire_step_radps=step_radps)
+
+
+def exchange_amid(chassis: Chassis, link: ScriptedSerialLink, chunks: list[bytes]) -> None:
+    """One exchange for each chunk that arrives, asked to drive; see check_state."""
+    for k, chunk in enumerate(chunks, start=1):
+        link.deliver(chunk)
+        check_state(chassis.exchange(Setpoint(k * 20 * MS, 1.0, 0.0, 0.5), k * 20 * MS))
 
 
 def check_state(state: ChassisState) -> None:

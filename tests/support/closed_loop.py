@@ -20,7 +20,7 @@ from controller.path.path import Path
 from controller.shape import SpeedShaper
 from hal.clocks import NS_PER_S
 from hal.geometry import advance_pose, camera_in_floor
-from hal.types import CameraMount, FloatArray, PlanarPose, Pose
+from hal.types import CameraMount, FloatArray, Pose
 from vision.scene import CameraCondition, CameraHealth, EgoMotion, FreeSpace, Obstacle, Scene
 
 PERIOD_S = 0.02
@@ -33,10 +33,6 @@ STILL = EgoMotion(Pose(np.eye(3), np.zeros(3)), FRAME_S, "none", math.nan, math.
 GOOD = CameraHealth(CameraCondition.GOOD, "", 0.9)
 
 Trajectory = Callable[[float], tuple[float, float]]
-
-
-def straight(length_m: float) -> Path:
-    return Path(PathSpec(segments=(LineSpec(kind="line", length_m=length_m),)), Robot())
 
 
 def bend(radius_m: float, angle_deg: float, before_m: float = 6.0, after_m: float = 8.0) -> Path:
@@ -291,7 +287,3 @@ def optimum_s(path: Path, mission: Mission) -> float:
     limits = mission.robot.limits
     stop = braking.stop(limits.max_speed_mps, 0.0, braking.comfort(limits))
     return 2 * stop.time_s + (path.length_m - 2 * stop.distance_m) / limits.max_speed_mps
-
-
-def start_pose(x_m: float = 0.0) -> PlanarPose:
-    return PlanarPose(x_m, 0.0, 0.0)

@@ -7,7 +7,6 @@ import math
 import numpy as np
 
 from config.decision import DecisionConfig
-from config.path import LineSpec, PathSpec
 from config.robot import Robot
 from controller.decision.decide import DecisionMaker
 from controller.decision.decision import Decision
@@ -15,11 +14,12 @@ from controller.decision.situation import Situation
 from controller.path.path import OnPath, Path
 from hal.geometry import camera_in_floor
 from hal.types import CameraMount, PlanarPose
+from tests.support.floor_bodies import line_path
 from tests.support.scenes import GOOD, STILL, free_space
 from vision.scene import CameraHealth, FreeSpace, Obstacle, Scene
 
 MOUNT = CameraMount(0.45, 0.0, 0.60, math.radians(4.0))
-PATH = Path(PathSpec(segments=(LineSpec(kind="line", length_m=30.0),)), Robot())
+PATH = line_path(30.0)
 STEP_NS = 20_000_000
 AGE_NS = 60_000_000
 

@@ -16,7 +16,8 @@ from controller.governor.request import Twist
 from hal.clocks import NS_PER_S
 from hal.geometry import advance_pose
 from hal.types import PlanarPose
-from tests.support.closed_loop import FRAME_S, LATENCY_S, MOUNT, PERIOD_S, Box, Mission, Noise, straight
+from tests.support.closed_loop import FRAME_S, LATENCY_S, MOUNT, PERIOD_S, Box, Mission, Noise
+from tests.support.floor_bodies import line_path
 from vision.scene import Scene
 
 Planner = Callable[[float], Twist | None]
@@ -56,7 +57,7 @@ class GovernedDrive:
         self.governor = SpeedGovernor(
             config or GovernorConfig(), decision or DecisionConfig(), self.robot, MOUNT, PERIOD_S
         )
-        self._camera_model = Mission(straight(1.0), boxes or [], noise)
+        self._camera_model = Mission(line_path(1.0), boxes or [], noise)
         self._lag_s, self._yaw_ratio = lag_s, yaw_ratio
         self.pose = PlanarPose(0.0, 0.0, 0.0)
         self.t_s, self.v_mps, self.w_radps = 0.0, 0.0, 0.0

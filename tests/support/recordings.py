@@ -6,9 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from hal.cameras.recording import Recording
+from hal.cameras.recording import Recording, frames_of
 from hal.cameras.tum_writer import TumWriter
-from hal.errors import EndOfStream
 from hal.types import Intrinsics, RgbdFrame
 
 DESK_RPY = Path(__file__).resolve().parents[1] / "recordings" / "desk_rpy"
@@ -58,10 +57,5 @@ def set_key(folder: Path, key: str, value: str | None) -> None:
 
 def read_all(replay: Recording) -> list[RgbdFrame]:
     """Every frame of a recording, from opening it to its end."""
-    frames: list[RgbdFrame] = []
     with replay:
-        while True:
-            try:
-                frames.append(replay.read(1.0))
-            except EndOfStream:
-                return frames
+        return list(frames_of(replay))

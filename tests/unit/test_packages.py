@@ -41,12 +41,13 @@ def test_the_docstring_of_each_folder_lists_all_of_its_files(name: str) -> None:
     assert missing == []
 
 
-# Neither devices nor emulators: what to look for in a bag and what came with its images, a folder on the
-# disk, the simulated outside.
+# Neither devices nor emulators: what to look for in a bag and what came with its images, what any recording
+# offers, a folder on the disk, the simulated outside.
 NO_DEVICES = {
     "hal.cameras.bag_topics",
     "hal.cameras.gyro_track",
     "hal.cameras.pose_track",
+    "hal.cameras.recording",
     "hal.cameras.tum_writer",
     "sim.contact",
     "sim.plant",

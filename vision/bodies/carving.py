@@ -42,7 +42,6 @@ from vision.motion import moving_fragments
 from vision.motion.least_squares import FragmentVelocities
 from vision.motion.velocities import EndResiduals
 from vision.numerics.order import median
-from vision.scene import IMPLAUSIBLE_SPEED_FACTOR
 
 # Score at the start. It is used up in 0.09 s where nothing speaks for motion, in 0.6 s where something does.
 SUSPECT_EVIDENCE = 0.3
@@ -180,8 +179,7 @@ def _around_moving_fragments(
     group = moving_fragments.cluster(position, velocity, covariance, sigma)
     company = np.bincount(group)[group] >= _MIN_FRAGMENTS
     seen_s = detection.age_frames.take(chosen).astype(float) * detection.dt_s
-    most_mps = IMPLAUSIBLE_SPEED_FACTOR * config.motion.max_speed_mps
-    chosen = chosen[company | _believable_alone(seen_s, velocity, covariance, most_mps)]
+    chosen = chosen[company | _believable_alone(seen_s, velocity, covariance, config.motion.implausible_mps)]
     if len(chosen) == 0:
         return result
     return near_ends(

@@ -48,7 +48,6 @@ from hal.compiled import compiled
 from hal.types import FloatArray
 from vision.bodies.motion_evidence import MotionEvidence
 from vision.bodies.proof import Proof, prove
-from vision.scene import IMPLAUSIBLE_SPEED_FACTOR
 
 # Time in which the weakest proof raises the score by 1: two frames at 30 a second. With three frames the
 # first detection came 0.07 s later.
@@ -94,7 +93,7 @@ def judge(
 
     seen: evidence of this frame. evidence, moving (T,): score and verdict of the frame before, dt_s ago.
     """
-    proof = prove(seen, moving, IMPLAUSIBLE_SPEED_FACTOR * settings.max_speed_mps, dt_s, settings)
+    proof = prove(seen, moving, dt_s, settings)
     new_evidence, new_moving, confidence = _updated_scores(
         proof,
         evidence,

@@ -197,10 +197,8 @@ def _proofs(
     return moves, strength, surely_static, over, goes_on
 
 
-def prove(
-    seen: MotionEvidence, moving: BoolArray, fastest_mps: float, dt_s: float, settings: MotionSettings
-) -> Proof:
-    """The proofs of this frame. moving (T,): last verdict. fastest_mps: no body is faster."""
+def prove(seen: MotionEvidence, moving: BoolArray, dt_s: float, settings: MotionSettings) -> Proof:
+    """The proofs of this frame. moving (T,): last verdict."""
     velocity, covariance = np.empty((4, len(moving), 3)), np.empty((4, len(moving), 3, 3))
     velocity[_FILTERED], covariance[_FILTERED] = seen.velocity, seen.covariance
     velocity[_FRAME], covariance[_FRAME] = seen.own_velocity, seen.own_covariance
@@ -211,7 +209,7 @@ def prove(
     second = second_opinion(parts, _FILTERED, _SURFACE, _APART)
     alone_mps = 0.0 if seen.reckoned else _ALONE_MPS
     least_mps = settings.min_speed_mps + alone_mps + _SPEED_PER_METRE * seen.distance_m
-    demands = _Demands(least_mps, fastest_mps, settings.sigmas**2, dt_s)
+    demands = _Demands(least_mps, settings.implausible_mps, settings.sigmas**2, dt_s)
     moves, strength, surely_static, over, goes_on = _proofs(seen, parts, second, demands, moving)
     return Proof(
         moves=moves,

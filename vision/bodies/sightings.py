@@ -20,7 +20,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from config.perception import DepthNoise
+from config.perception import DepthNoise, MotionSettings
 from hal.compiled import compiled
 from hal.types import Flags, FloatArray, Integers, Intrinsics, Pose
 from vision.bodies.tracks import Tracks
@@ -82,20 +82,20 @@ def keeps_area(tracks: Tracks, cells: Integers) -> Flags:
     return result
 
 
-def forget_implausible(tracks: Tracks, fastest_mps: float, sigma_mps: float) -> None:
-    """Forget velocities faster than fastest_mps of tracks that are not known to move.
+def forget_implausible(tracks: Tracks, settings: MotionSettings) -> None:
+    """Forget implausible velocities of tracks that are not known to move.
 
     They come from a surface that jumped. While a filter forgets one slowly, it passes through all plausible
-    velocities, and each would be proof of motion. sigma_mps: of an unknown velocity, per axis.
+    velocities, and each would be proof of motion.
     """
     for state, covariance in (
         (tracks.state, tracks.covariance),
         (tracks.surface_state, tracks.surface_covariance),
     ):
-        implausible = np.square(state[:, 3:]).sum(axis=1) > fastest_mps**2
+        implausible = np.square(state[:, 3:]).sum(axis=1) > settings.implausible_mps**2
         wild = (implausible & ~tracks.moving).nonzero()[0]
         if len(wild):
-            kalman.forget_velocity(state, covariance, wild, sigma_mps)
+            kalman.forget_velocity(state, covariance, wild, settings.max_speed_mps)
 
 
 def _note_view(tracks: Tracks, detection: Detection, measured: Regions, kind: NDArray[np.intp]) -> None:

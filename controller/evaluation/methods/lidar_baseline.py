@@ -17,7 +17,7 @@ from controller.evaluation.methods.lidar_clusters import find_clusters
 from controller.evaluation.methods.lidar_matching import refine
 from controller.evaluation.methods.lidar_scan import LidarModel, Scan
 from controller.evaluation.types import CALLED_MOVING, NO_BOX, DetectedObject, MethodOutput
-from hal.geometry import body_in_floor, camera_in_body
+from hal.geometry import body_in_floor, camera_in_body, planar
 from hal.types import CameraMount, FloatArray, Intrinsics, PlanarPose, Pose
 
 _GATE_M = 0.6  # a cluster farther from a track does not belong to it
@@ -151,7 +151,7 @@ class LidarTracker:
             odometry_motion = (
                 sensor.inverse() @ body_in_floor(self._motion_since_last_scan(odometry)) @ sensor
             )
-            matched = body_in_floor(refine(before, scan, _planar(odometry_motion)))
+            matched = body_in_floor(refine(before, scan, planar(odometry_motion)))
             self._pose = self._pose @ sensor @ matched @ sensor.inverse()
         self._last = (scan, odometry)
 
@@ -159,7 +159,7 @@ class LidarTracker:
         """Pose of the robot relative to its pose at the last scan, by odometry."""
         if self._last is None:
             return PlanarPose(0.0, 0.0, 0.0)
-        return _planar(body_in_floor(self._last[1]).inverse() @ body_in_floor(odometry))
+        return planar(body_in_floor(self._last[1]).inverse() @ body_in_floor(odometry))
 
     def _start_track(self, position_m: FloatArray, sigma_m: float, stamp_s: float) -> None:
         covariance = np.diag([sigma_m**2, sigma_m**2, 1.0, 1.0])
@@ -172,11 +172,6 @@ class LidarTracker:
             for track in self._tracks:
                 track.predict(t_s - self._now_s)
         self._now_s = t_s if self._now_s is None else max(t_s, self._now_s)
-
-
-def _planar(pose: Pose) -> PlanarPose:
-    heading_rad = math.atan2(pose.rotation[1, 0], pose.rotation[0, 0])
-    return PlanarPose(float(pose.translation_m[0]), float(pose.translation_m[1]), heading_rad)
 
 
 def _on_floor(points_m: FloatArray) -> FloatArray:

@@ -11,12 +11,12 @@ from typing import Literal
 
 from config.camera import SimulatedCameraConfig
 from config.scenario import Scenario
+from controller.evaluation.simulated_set.places import PlaceName
 from controller.evaluation.simulated_set.scenes import Mover, build, side_by_side
 from controller.evaluation.simulated_set.scripted_drive import SLIPPING, Knot, OdometryError, ScriptedDrive
 
 Split = Literal["tuning", "reporting"]
 Noise = Literal["realsense", "paper"]
-PlaceName = Literal["hall", "aisle", "workshop"]
 
 _USUAL = OdometryError()
 _MOVING_S = 4.0

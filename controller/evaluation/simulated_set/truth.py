@@ -58,14 +58,14 @@ def _is_turning(body: BodyState) -> bool:
 def _visible_object(body: BodyTruth) -> TrueObject:
     u0, v0, u1, v1 = body.bbox_px
     return TrueObject(
-        body.state.id,
-        body.state.kind,
-        (float(u0), float(v0), float(u1), float(v1)),
-        body.visible_px,
-        body.visible_ratio,
-        body.position_m,
-        body.velocity_mps,
-        _is_turning(body.state),
+        id=body.state.id,
+        kind=body.state.kind,
+        box=(float(u0), float(v0), float(u1), float(v1)),
+        visible_px=body.visible_px,
+        visible_ratio=body.visible_ratio,
+        position_m=body.position_m,
+        velocity_mps=body.velocity_mps,
+        turning=_is_turning(body.state),
     )
 
 
@@ -73,4 +73,13 @@ def _hidden_object(body: BodyState, camera: Pose) -> TrueObject:
     velocity: FloatArray = np.array([*body.velocity_mps, 0.0]) @ camera.rotation
     on_floor = np.array([[body.pose.x_m, body.pose.y_m, 0.5 * sum(body.z_m)]])
     middle = camera.inverse().apply(on_floor)[0]
-    return TrueObject(body.id, body.kind, NO_BOX, 0, 0.0, middle, velocity, _is_turning(body))
+    return TrueObject(
+        id=body.id,
+        kind=body.kind,
+        box=NO_BOX,
+        visible_px=0,
+        visible_ratio=0.0,
+        position_m=middle,
+        velocity_mps=velocity,
+        turning=_is_turning(body),
+    )

@@ -63,7 +63,7 @@ def test_known_keys_are_listed_once(tmp_path: Path) -> None:
     )
 
 
-def test_within_a_list(tmp_path: Path) -> None:
+def test_the_right_key_is_proposed_within_a_list_too(tmp_path: Path) -> None:
     path = tmp_path / "hall.yaml"
     path.write_text("name: hall\npath: {segments: [{kind: arc, radius_m: 3.0, angle_deg: 9.0, radios: 1}]}\n")
     with pytest.raises(ConfigError, match=r"radios: unknown key; did you mean radius_m\?"):

@@ -9,10 +9,10 @@ from typing import get_args
 import pytest
 import yaml
 
+from config.app import HIL_BASES
 from config.chassis import CHASSIS_KINDS, AnyChassisConfig
 from config.loader import CONFIG_DIR
 from controller.cli.emulate import FAULTS
-from controller.faults.trials import KINDS as EVERY_BASE
 from hal.chassis.driver import ChassisDriver, ChassisFeedback
 from hal.links.scripted import serial_pair
 from hal.types import Setpoint
@@ -43,7 +43,7 @@ def test_page_names_the_fields_of_the_feedback(word: str) -> None:
     assert hasattr(ChassisFeedback, word)
 
 
-def test_the_faults_to_type() -> None:
+def test_the_page_names_the_faults_that_the_emulator_takes() -> None:
     assert set(FAULTS) <= set(PAGE.quoted)
 
 
@@ -136,7 +136,7 @@ STEPS = {
     ),
     "own time-out": lambda kind: f'"{kind}": ' in read("tests/unit/controller/faults/test_faults.py"),
     "guard": lambda kind: f'"{kind}": {kind}_rig' in read("tests/unit/controller/base/test_guard.py"),
-    "mission and faults": lambda kind: kind in EVERY_BASE,
+    "mission and faults": lambda kind: kind in HIL_BASES,
     "README": lambda kind: kind.lower() in read("README.md").lower(),
 }
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from config.app import load_app
-from config.loader import CONFIG_DIR
+from config.app import hil_file, load_app
 from controller.build_chassis import build_base_in_memory
 from hal.types import ChassisMode, PlanarPose, Setpoint
 from tests.support.chassis_rig import MS
@@ -16,7 +15,7 @@ from tests.support.chassis_rig import MS
 def test_a_command_is_too_old_after_the_time_of_the_configuration(
     kind: str, changes: dict[str, int], age_ms: int
 ) -> None:
-    config = load_app(CONFIG_DIR / f"hil-{kind}.yaml")
+    config = load_app(hil_file(kind))
     config = config.model_copy(update={"chassis": config.chassis.model_copy(update=changes)})
     chassis, emulator, _ = build_base_in_memory(config, PlanarPose(0.0, 0.0, 0.0), 0)
     now_ns = 0

@@ -18,9 +18,9 @@ from tests.support.closed_loop import (
     optimum_s,
     reversals,
     standing_at,
-    straight,
     walking,
 )
+from tests.support.floor_bodies import line_path
 from vision.scene import Scene
 
 # Of the chassis, and one control step.
@@ -61,7 +61,7 @@ def drive(mission: Mission, seconds: float = 60.0) -> Log:
 
 
 def test_an_empty_path_takes_no_more_than_one_per_cent_longer_than_the_optimum() -> None:
-    mission = Mission(straight(40.0), [], lag_s=0.02)
+    mission = Mission(line_path(40.0), [], lag_s=0.02)
     drive(mission)
     assert mission.reached
     # 0.06 s pass until the first scene is there.
@@ -93,8 +93,8 @@ def test_no_slow_section_is_left_before_its_end() -> None:
 
 def test_a_crate_beside_the_path_costs_at_most_two_per_cent() -> None:
     empty, beside = (
-        Mission(straight(25.0), []),
-        Mission(straight(25.0), [Box(standing_at(12.0, -1.0), 0.6, 0.5, 0.6)], REAL),
+        Mission(line_path(25.0), []),
+        Mission(line_path(25.0), [Box(standing_at(12.0, -1.0), 0.6, 0.5, 0.6)], REAL),
     )
     drive(empty)
     drive(beside)
@@ -103,7 +103,7 @@ def test_a_crate_beside_the_path_costs_at_most_two_per_cent() -> None:
 
 @pytest.mark.parametrize("noise", [Noise(), REAL])
 def test_a_crate_on_the_path_is_stopped_before_comfortably(noise: Noise) -> None:
-    mission = Mission(straight(15.0), [Box(standing_at(8.0, 0.0), 0.6, 0.6, 0.6)], noise)
+    mission = Mission(line_path(15.0), [Box(standing_at(8.0, 0.0), 0.6, 0.6, 0.6)], noise)
     log = drive(mission, 20.0)
     assert log.v_mps[-1] == 0.0
     assert 0.3 <= log.clearance_m[-1] <= 0.6
@@ -112,7 +112,7 @@ def test_a_crate_on_the_path_is_stopped_before_comfortably(noise: Noise) -> None
 
 
 def test_a_low_pallet_that_sinks_below_the_view_is_not_touched() -> None:
-    mission = Mission(straight(15.0), [Box(standing_at(8.0, 0.1), 1.2, 0.8, 0.15)], REAL)
+    mission = Mission(line_path(15.0), [Box(standing_at(8.0, 0.1), 1.2, 0.8, 0.15)], REAL)
     log = drive(mission, 30.0)
     assert log.v_mps[-1] == 0.0
     assert log.clearance_m[-1] > 0.3
@@ -125,14 +125,14 @@ def test_a_sill_below_the_view_is_not_forgotten_while_the_robot_stands_before_it
 ) -> None:
     """It is below the view long before the robot comes to rest; too wide or too plain to be an obstacle."""
     sill = Box(standing_at(8.0, 0.0), 0.2, wide_m, 0.15, seen_by_edges=seen_by_edges)
-    log = drive(Mission(straight(15.0), [sill], REAL), 40.0)
+    log = drive(Mission(line_path(15.0), [sill], REAL), 40.0)
     assert log.v_mps[-1] == 0.0
     assert log.clearance_m[-1] > 0.3
 
 
 def test_a_plain_wall_is_stopped_before_by_depth_alone() -> None:
     wall = Box(standing_at(9.0, 0.0), 0.2, 5.0, 3.0, seen_by_edges=False)
-    log = drive(Mission(straight(15.0), [wall], REAL), 20.0)
+    log = drive(Mission(line_path(15.0), [wall], REAL), 20.0)
     assert log.v_mps[-1] == 0.0
     assert 0.3 <= log.clearance_m[-1] <= 0.7
 
@@ -146,7 +146,7 @@ def test_a_plain_wall_is_stopped_before_by_depth_alone() -> None:
     ],
 )
 def test_a_crossing_person_is_let_pass(where: Trajectory, slowest: float) -> None:
-    mission = Mission(straight(18.0), [Box(where)], REAL)
+    mission = Mission(line_path(18.0), [Box(where)], REAL)
     log = drive(mission)
     assert mission.reached
     assert min(log.v_mps[100:600]) >= slowest
@@ -157,7 +157,7 @@ def test_a_person_who_stops_on_the_path_is_waited_for_and_then_it_goes_again() -
     def where(t_s: float) -> tuple[float, float]:
         return 8.0, 3.0 - min(max(t_s - 2.0, 0.0), 2.7) * 1.1 - max(t_s - 14.0, 0.0) * 1.1
 
-    mission = Mission(straight(15.0), [Box(where)], REAL)
+    mission = Mission(line_path(15.0), [Box(where)], REAL)
     log = drive(mission)
     assert mission.reached
     assert min(log.v_mps[300:]) == 0.0
@@ -166,7 +166,7 @@ def test_a_person_who_stops_on_the_path_is_waited_for_and_then_it_goes_again() -
 
 def test_an_oncoming_person_finds_it_standing() -> None:
     person = Box(walking(18.0, 0.0, -1.2, 0.0, 0.0, 8.0))
-    log = drive(Mission(straight(25.0), [person], REAL), 20.0)
+    log = drive(Mission(line_path(25.0), [person], REAL), 20.0)
     nearest = int(np.argmin(log.clearance_m))
     assert log.v_mps[nearest] == 0.0
 
@@ -175,7 +175,7 @@ def test_a_leader_that_brakes_hard_is_not_touched() -> None:
     def where(t_s: float) -> tuple[float, float]:
         return 4.0 + 0.8 * min(t_s, 9.0) + 0.8 * max(t_s - 15.0, 0.0), 0.0
 
-    mission = Mission(straight(18.0), [Box(where)], REAL)
+    mission = Mission(line_path(18.0), [Box(where)], REAL)
     log = drive(mission)
     assert mission.reached
     assert min(log.clearance_m) > 0.2
@@ -197,7 +197,7 @@ def test_a_camera_that_falls_silent_leads_to_a_stop_at_first_by_comfort() -> Non
     def silent(scene: Scene, t_s: float) -> Scene | None:
         return scene if t_s < 6.0 or t_s > 14.0 else None
 
-    mission = Mission(straight(20.0), [], alter=silent)
+    mission = Mission(line_path(20.0), [], alter=silent)
     log = drive(mission)
     assert mission.reached
     assert log.v_mps[round(13.5 / 0.02)] == 0.0

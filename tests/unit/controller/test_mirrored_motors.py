@@ -2,8 +2,7 @@
 
 import pytest
 
-from config.app import load_app
-from config.loader import CONFIG_DIR
+from config.app import hil_file, load_app
 from controller.build_chassis import build_serial_driver, build_serial_emulator
 from hal.links.scripted import serial_pair
 from hal.types import ChassisMode, Setpoint
@@ -14,7 +13,7 @@ from tests.support.chassis_rig import MS, PLANT
 @pytest.mark.parametrize("kind", ["roboclaw", "roboteq"])
 @pytest.mark.parametrize("mirrored", [("invert_left",), ("invert_right",), ("invert_left", "invert_right")])
 def test_base_with_mirrored_motors_drives_straight_ahead(kind: str, mirrored: tuple[str, ...]) -> None:
-    config = load_app(CONFIG_DIR / f"hil-{kind}.yaml").chassis
+    config = load_app(hil_file(kind)).chassis
     config = config.model_copy(update=dict.fromkeys(mirrored, True))
     near, far = serial_pair()
     base, plant = build_serial_driver(config, near), TrackedPlant(PLANT)

@@ -114,7 +114,9 @@ def test_a_recorded_gyro_that_is_not_wanted_is_left_out(
 
 def test_a_recorded_gyro_is_used(tmp_path: Path) -> None:
     with recorded_camera(with_gyro, tmp_path, SimulatedClock()) as camera:
-        assert camera.read(1.0).gyro is not None
+        gyro = camera.read(1.0).gyro
+    assert gyro is not None
+    assert gyro.rates_radps.tolist() == [[1.0, 1.0, 1.0]]
 
 
 def test_a_topic_of_a_gyro_that_is_not_wanted_is_refused(tmp_path: Path) -> None:

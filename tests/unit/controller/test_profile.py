@@ -29,7 +29,7 @@ def ramps(v: float, a: float, targets: list[float], latency_s: float = 0.0) -> S
 
 
 @given(st.floats(0.0, 1.5), st.floats(-0.7, 0.3), st.floats(0.0, 1.5), st.floats(0.0, 12.0))
-def test_is_the_law_of_ruckig(v: float, a: float, target: float, t: float) -> None:
+def test_the_ramps_are_those_of_ruckig(v: float, a: float, target: float, t: float) -> None:
     problem = InputParameter(1)
     problem.control_interface = ControlInterface.Velocity
     problem.current_position, problem.current_velocity, problem.current_acceleration = [0.0], [v], [a]

@@ -39,7 +39,7 @@ VECTORS: list[tuple[AgilexMessage, int, str]] = [
 
 
 @pytest.mark.parametrize(("message", "count", "data"), VECTORS)
-def test_says_byte_for_byte(message: AgilexMessage, count: int, data: str) -> None:
+def test_every_message_is_written_byte_for_byte(message: AgilexMessage, count: int, data: str) -> None:
     assert wrap(encode(message), count) == bytes.fromhex(data)
 
 

@@ -77,7 +77,7 @@ def test_bends_one_way_and_the_other_are_followed(lag_s: float, w_radps: float) 
     assert_follows(lag_s, [(0.5, w_radps if period // 70 % 2 else -w_radps) for period in range(1000)])
 
 
-def test_zero_ends_it() -> None:
+def test_a_zero_command_ends_the_complaint() -> None:
     following = Following()
     seconds_until_told(following, 0.5)
     following.ordered(Setpoint(0, 0.0, 0.0, 0.0))

@@ -63,7 +63,7 @@ CORE = bytes.fromhex("01 0F E8 03 02 02 01 FF FF 01 00 00 00 00 00 A2 02")
 INERTIA = bytes.fromhex("04 07 28 23 18 FC 00 00 00")  # 90 degrees, -10 degrees a second
 
 
-def test_values_of_a_frame() -> None:
+def test_every_value_of_a_frame_is_decoded() -> None:
     told = packets.parse(CORE + INERTIA + bytes.fromhex("06 02 64 0A"))
     assert told is not None
     assert told.core == Core(1000, 2, 2, 1, 65_535, 1, 0, 16.2, 2)

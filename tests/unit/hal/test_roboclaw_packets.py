@@ -61,7 +61,7 @@ def reply(request: Request, data: bytes) -> bytes:
     return data + packets.crc16(bytes((ADDRESS, request.command)) + data).to_bytes(2, "big")
 
 
-def test_values_of_replies() -> None:
+def test_every_value_of_the_replies_is_decoded() -> None:
     assert packets.timeout_ms(b"\x03") == 300
     assert packets.main_battery_v(bytes.fromhex("00 FC")) == 25.2
     assert packets.currents_a(bytes.fromhex("00 64 FF 9C")) == (1.0, -1.0)

@@ -98,7 +98,7 @@ def test_the_end_of_an_overlong_line_is_no_line() -> None:
     assert reader.foreign_lines == 1, "an empty line is nothing"
 
 
-def test_fault_flags() -> None:
+def test_fault_flags_are_told_in_words_and_unknown_ones_by_number() -> None:
     assert lines.describe_faults(0) == ()
     assert lines.describe_faults(0x10) == (), "the emergency stop is told apart"
     assert lines.describe_faults(0x07) == (

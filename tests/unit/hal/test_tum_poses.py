@@ -19,10 +19,10 @@ S = 1_000_000_000
 HALF = math.sqrt(0.5)  # sine and cosine of 45 degrees: a quarter turn as a quaternion
 
 
-def poses(folder: Path, *lines: str, max_gap_s: float = 0.2) -> PoseFile:
+def poses(folder: Path, *lines: str) -> PoseFile:
     path = folder / "odometry.txt"
     path.write_text("# timestamp tx ty tz qx qy qz qw\n" + "\n".join(lines) + "\n")
-    return PoseFile(path, max_gap_s)
+    return PoseFile(path)
 
 
 def test_a_pose_at_its_own_time_is_given_as_written(tmp_path: Path) -> None:

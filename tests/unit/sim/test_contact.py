@@ -51,7 +51,7 @@ def test_the_nearest_of_several_is_named() -> None:
     assert found.distance_m == pytest.approx(1.0 - 0.39 - 0.2 * math.cos(math.pi / 4))
 
 
-def test_overlap_touches() -> None:
+def test_bodies_that_overlap_touch() -> None:
     crate = Crate(kind="crate", name="crate", x_m=0.7, y_m=0.0, length_m=0.6, width_m=0.6)
     found = nearest_body(world(crate), ROBOT, HERE, 0.0)
     assert found.touches

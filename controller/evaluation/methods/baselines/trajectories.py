@@ -34,6 +34,7 @@ _TOLERANCE_PX = 1.0  # inliers of the rigid motion
 _MOVING_PX = 2.0  # a trajectory whose residual is larger gets a vote for moving
 _LINK_M = 0.45  # points that are closer belong to one blob
 _MIN_TRAJECTORIES = 5  # of a blob
+_MIN_SHARED = 30  # trajectories that the old image and the newest must share
 _VOTE_DECAY = 0.6  # weight of the votes of earlier frames
 
 
@@ -77,14 +78,13 @@ class Trajectories:
     def _vote(self, k: Intrinsics) -> None:
         """Vote by the motion since the oldest image that shares enough trajectories with the newest."""
         self._votes = self._votes * _VOTE_DECAY
-        for snapshot in self._history:
+        for index, snapshot in enumerate(self._history):
+            if len(self._history) - index < _MIN_AGE:
+                return
             _, old, new = np.intersect1d(snapshot.ids, self._ids, assume_unique=True, return_indices=True)
             known = snapshot.depth_m[old] > 0.0
             old, new = old[known], new[known]
-            age = len(self._history) - next(i for i, past in enumerate(self._history) if past is snapshot)
-            if age < _MIN_AGE:
-                return
-            if len(old) < 30:
+            if len(old) < _MIN_SHARED:
                 continue
             points_m = ego_motion.back_project(snapshot.pixels[old], snapshot.depth_m[old], k)
             motion = ego_motion.rigid_motion(points_m, self._pixels[new], k, _TOLERANCE_PX)

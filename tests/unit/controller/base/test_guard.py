@@ -131,7 +131,7 @@ def accelerate(rig: Rig, periods: int) -> ChassisState:
 
 
 @pytest.mark.parametrize("kind", RIGS)
-def test_around_every_driver(kind: str) -> None:
+def test_the_guard_works_around_every_driver(kind: str) -> None:
     """A right drive passes; a jump stops the base, latches with its reason, and needs consent."""
     with RIGS[kind]("scripted") as rig:
         rig.chassis = GuardedChassis(rig.chassis, LIMITS)

@@ -86,7 +86,7 @@ def test_json_keys_stay() -> None:
     }
 
 
-def test_text_is_the_json() -> None:
+def test_the_text_of_a_report_is_its_json() -> None:
     assert json.loads(report().to_text()) == report().as_json()
 
 

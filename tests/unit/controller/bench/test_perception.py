@@ -31,7 +31,7 @@ SETTINGS = PerceptionConfig().fragments
 
 @pytest.fixture(scope="module")
 def reel() -> Reel:
-    whole = recorded_reel(TumReplay(DESK), None)
+    whole = recorded_reel(TumReplay(DESK))
     return Reel(whole.frames[:3], whole.odometry[:3], whole.mount)
 
 
@@ -86,7 +86,7 @@ def test_a_watched_pass_sees_the_stages(reel: Reel) -> None:
         assert spent["vision.fragments.edges.find_edges"].opencv_ns > 0
 
 
-def test_figures_of_a_reel(reel: Reel) -> None:
+def test_the_figures_of_a_reel_are_whole(reel: Reel) -> None:
     ticks = Ticks()
     stopwatches = Stopwatches(time.process_time_ns, time.perf_counter_ns)
     figures = measure_perception(reel, make, SETTINGS, 2, stopwatches, ticks)

@@ -51,7 +51,7 @@ def test_the_floor_is_the_clock_s_own() -> None:
     assert measure_empty_loop(JitteryClock(), 10.0).worst_off_ms == pytest.approx(0.5)
 
 
-def test_stolen_time(tmp_path: Path) -> None:
+def test_stolen_time_is_that_of_all_cpus_and_unknown_without_the_file(tmp_path: Path) -> None:
     stat = tmp_path / "stat"
     stat.write_text("cpu  1 2 3 4 5 6 7 800 0 0\ncpu0 1\n")
     assert stolen_s(stat) == pytest.approx(8.0)

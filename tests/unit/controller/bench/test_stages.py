@@ -80,7 +80,7 @@ def test_own_time_excludes_inner_functions() -> None:
     assert watch.take() == {"outer": FunctionTime(1, 3, 0), "inner": FunctionTime(2, 10, 0)}
 
 
-def test_taking_starts_anew() -> None:
+def test_what_was_taken_is_not_counted_again() -> None:
     watch = StageTimer(Clock())
     watch.run("once", lambda: None, (), {})
     assert watch.take() == {"once": FunctionTime(1, 0, 0)}

@@ -129,7 +129,7 @@ def test_the_report_gives_the_command_that_repeats_it() -> None:
     again = cli.commands["campaign"].make_context("campaign", shlex.split(command_line(options))[2:]).params
     assert (again["config_path"], again["report"]) == (Path("my robot.yaml"), Path("out/a b"))
     assert (again["missions"], again["mode"], again["workers"], again["seed"]) == (4, "camera", 3, 7)
-    assert (again["families"], again["policies"], again["scenarios"]) == ("group", "ours", ("my.yaml",))
+    assert (again["families"], again["policies"], again["scenarios"]) == (("group",), ("ours",), ("my.yaml",))
 
 
 def test_missions_take_turns_over_the_families() -> None:

@@ -144,7 +144,9 @@ def test_doubtful_scenario_is_reported(world: Path) -> None:
         (("--only", "no_such.yaml:3"), "no_such.yaml: cannot be read"),
     ],
 )
-def test_mistakes_are_told(given: tuple[str, ...], told: str, tmp_path: Path) -> None:
+def test_mistakes_are_told_before_anything_is_written(
+    given: tuple[str, ...], told: str, tmp_path: Path
+) -> None:
     with pytest.raises((ConfigError, UserError), match=told):
         campaign(*given, "--report", tmp_path / "report")
     assert not (tmp_path / "report").exists()

@@ -42,7 +42,7 @@ def measured(recording: DriveRecording) -> StopAndGo:
     return measure(recording, ROBOT, DECISION)
 
 
-def test_the_four_numbers() -> None:
+def test_the_times_and_shares_of_a_made_up_drive() -> None:
     found = measured(made_up())
     assert found.to_stop_s == pytest.approx(4.0)
     # 1 / 0.3 + 0.3 / 0.6 s to rest, of which the last 0.02 m/s take sqrt(2 0.02 / 0.6) s.

@@ -26,7 +26,7 @@ def test_a_config_that_is_not_there() -> None:
     assert "nowhere.yaml: cannot be read (No such file" in refusal("run", "--config", "nowhere.yaml")
 
 
-def test_an_unknown_key(tmp_path: Path) -> None:
+def test_an_unknown_key_is_told_with_its_place(tmp_path: Path) -> None:
     config = changed_config(tmp_path, robot={"limits": {"max_sped_mps": 1.0}})
     message = refusal("run", "--config", config)
     assert "mine.yaml: robot.limits.max_sped_mps: unknown key" in message
@@ -77,7 +77,7 @@ def test_a_path_that_the_robot_cannot_drive(tmp_path: Path) -> None:
     assert "radius" in message
 
 
-def test_an_unknown_scenario() -> None:
+def test_for_an_unknown_scenario_the_nearest_name_is_proposed() -> None:
     message = refusal("run", "--scenario", "warehous")
     assert "warehous: there is no such scenario; did you mean warehouse?" in message
 
@@ -128,7 +128,7 @@ def test_no_command_at_all_is_answered_with_the_help() -> None:
     assert "Usage: treadwatch [OPTIONS] COMMAND" in done.stderr
 
 
-def test_an_empty_config() -> None:
+def test_an_empty_config_is_refused() -> None:
     assert refusal("run", "--config", "/dev/null") == (
         "treadwatch: /dev/null: is empty; it must hold keys and values"
     )

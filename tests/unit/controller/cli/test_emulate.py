@@ -12,12 +12,10 @@ from pathlib import Path
 import pytest
 import yaml
 
-from config.app import load_app
+from config.app import HIL_BASES, hil_file, load_app
 from config.chassis import CanLinkConfig, SerialLinkConfig
-from config.loader import CONFIG_DIR
 from controller.cli.emulate import EmulateOptions, _linked, can_link, run_in_real_time, with_wire
 from controller.errors import UserError
-from controller.faults.trials import KINDS
 from controller.realtime.service import StopRequest
 from hal.chassis.agilex_messages import ControlModeCommand, MotionCommand, encode
 from hal.clocks import SimulatedClock
@@ -76,7 +74,7 @@ def test_a_process_that_was_frozen_does_not_send_what_it_missed() -> None:
     assert emulator.plant.twist[0] == pytest.approx(0.0, abs=1e-3), "its own time-out ran meanwhile"
 
 
-def test_faults_by_word() -> None:
+def test_a_word_makes_a_fault_and_an_unknown_word_is_answered() -> None:
     _, base = can_pair()
     emulator = AgilexEmulator(base, TrackedPlant(PLANT))
     words = iter([["estop"], [], ["release", "boom"], *[[]] * 1000])
@@ -114,13 +112,13 @@ def test_a_link_that_cannot_be_is_refused() -> None:
 
 
 def test_a_path_is_a_serial_port_for_a_base_that_has_both() -> None:
-    agilex = load_app(CONFIG_DIR / "hil-agilex.yaml").chassis
+    agilex = load_app(hil_file("agilex")).chassis
     moved = with_wire(agilex, EmulateOptions("agilex", channel="/tmp/port"))
     assert moved == agilex.model_copy(update={"link": SerialLinkConfig(url="/tmp/port")})
     assert with_wire(agilex, EmulateOptions("agilex", channel="can0")) is agilex
     adapter = EmulateOptions("agilex", channel="/dev/ttyACM0", interface="slcan")
     assert with_wire(agilex, adapter) is agilex, "a CAN adapter on a serial port"
-    kobuki = load_app(CONFIG_DIR / "hil-kobuki.yaml").chassis
+    kobuki = load_app(hil_file("kobuki")).chassis
     assert with_wire(kobuki, EmulateOptions("kobuki", channel="/tmp/port")) is kobuki
     tracer = agilex.model_copy(update={"model": "tracer"})
     with pytest.raises(UserError, match="tracer cannot be driven over a serial port"):
@@ -168,7 +166,7 @@ def test_the_path_of_another_emulator_is_left_to_it(tmp_path: Path) -> None:
     [
         (["roboteq", "--channel", "/nowhere/at/all"], "no link can be made there"),
         (["kobuki", "--port", "5000"], "this kobuki is on a serial port"),
-        (["roboclaw", "--config", str(CONFIG_DIR / "hil-agilex.yaml")], "its chassis is 'agilex'"),
+        (["roboclaw", "--config", str(hil_file("agilex"))], "its chassis is 'agilex'"),
         (["agilex", "--channel", "can7"], "can7"),
     ],
 )
@@ -182,14 +180,14 @@ def test_mistakes_are_one_line(arguments: list[str], words: str) -> None:
     assert words in done.stderr
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", HIL_BASES)
 def test_the_files_that_ship_fit_their_emulator(kind: str) -> None:
     """The emulated base is driven with its own geometry: what the driver believes is what the plant is."""
-    config = load_app(CONFIG_DIR / f"hil-{kind}.yaml")
+    config = load_app(hil_file(kind))
     assert config.simulation is not None
     assert config.simulation.base == "external"
     assert config.chassis.kind == kind.removesuffix("-serial")
-    content = yaml.safe_load((CONFIG_DIR / f"hil-{kind}.yaml").read_text())
+    content = yaml.safe_load((hil_file(kind)).read_text())
     plant, chassis = content["simulation"]["plant"], content["chassis"]
     assert plant["slip_factor"] == chassis.get("slip_factor", 1.0)
     assert plant["track_width_m"] == chassis.get("track_width_m", 0.23)

@@ -14,7 +14,7 @@ from controller.cli.envelope import Latency, describe_envelope, envelope, envelo
 TAU = Latency(0.06, 0.02, 0.12)
 
 
-def test_the_papers_numbers() -> None:
+def test_the_papers_distances_and_time_follow_from_its_limits() -> None:
     paper = envelope(Limits(), 10.0, TAU, 0.3).paper
     assert (paper.s_r_m, paper.t_t_s, paper.s_n_m) == pytest.approx((3.75, 5.0, 11.25))
 

@@ -43,7 +43,7 @@ def test_a_drive_succeeds_where_it_ended_as_asked_touched_nothing_and_kept_its_l
 
 
 @pytest.mark.parametrize("command", ["run", "govern"])
-def test_the_help_says_so(command: str) -> None:
+def test_the_help_tells_the_exit_codes(command: str) -> None:
     shown = " ".join(CliRunner().invoke(cli, [command, "--help"]).output.split())
     assert "Exit code 0 if" in shown
     assert "came to rest" in shown

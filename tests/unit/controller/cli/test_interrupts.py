@@ -40,7 +40,9 @@ def test_before_a_command_can_make_more_of_it(
     assert capsys.readouterr().err.strip() == "treadwatch: interrupted"
 
 
-def test_inside_a_compiled_step(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_interrupt_inside_of_a_compiled_step_ends_like_any_other(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     """As CPython reports an exception that C code did not pass on."""
 
     def interrupted(*_: object) -> int:

@@ -10,15 +10,16 @@ import pytest
 from config.decision import DecisionConfig, SightConfig
 from controller.decision.decision import Decision
 from controller.decision.standing_limits import _stands_within, _stop_distances
-from tests.support.closed_loop import Box, Mission, standing_at, straight
+from tests.support.closed_loop import Box, Mission, standing_at
 from tests.support.decision_bench import Bench, obstacle
+from tests.support.floor_bodies import line_path
 
 
 @pytest.mark.parametrize("near_m", [1.3, 0.4, 0.18])
 def test_a_camera_that_looks_down_steeply_is_no_reason_to_stand_nearer(near_m: float) -> None:
     config = DecisionConfig(sight=SightConfig(near_m=near_m))
     crate = Box(standing_at(9.0, 0.0), length_m=0.6, width_m=0.6, height_m=1.2)
-    log = Mission(straight(14.0), [crate], config=config).run(40.0)
+    log = Mission(line_path(14.0), [crate], config=config).run(40.0)
     assert min(log.clearance_m) == pytest.approx(config.margins.stop_m, abs=0.02)
     assert not any(decision.emergency for decision in log.decisions)
 

@@ -53,7 +53,7 @@ def test_more_pairs_win_over_a_cheap_one() -> None:
     assert assign(np.array([[0.0, 1.0], [0.1, INF]])) == ((0, 1), (1, 0))
 
 
-def test_nothing_to_assign() -> None:
+def test_where_no_pair_is_possible_nothing_is_assigned() -> None:
     assert assign(np.empty((0, 3))) == ()
     assert assign(np.empty((3, 0))) == ()
     assert assign(np.full((2, 2), INF)) == ()

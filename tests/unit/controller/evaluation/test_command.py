@@ -113,7 +113,7 @@ def test_an_unknown_sequence_is_named_with_those_that_exist() -> None:
     assert choose(()) == sequences()
 
 
-def test_only_without_sim(tmp_path: Path) -> None:
+def test_only_is_refused_without_sim(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="give --sim with it"):
         run_evaluation(EvaluationOptions((DESK,), False, tmp_path, only=("walk-plain",)))
 

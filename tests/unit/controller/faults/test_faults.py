@@ -11,10 +11,11 @@ from typing import Any
 
 import pytest
 
+from config.app import HIL_BASES
 from controller.errors import UserError
 from controller.faults.command import describe, write_section
 from controller.faults.kills import DriveProcesses, KillResult
-from controller.faults.trials import FAULTS, KINDS, Fault, TrialResult, run_trial
+from controller.faults.trials import FAULTS, Fault, TrialResult, run_trial
 from hal.types import ChassisMode
 
 # The bases' own time-outs, and what 0.5 m/s needs to go at 2 m/s2 with a lag of 0.08 s, to 1 mm/s.
@@ -22,7 +23,7 @@ OWN_TIMEOUT_S = {"agilex": 0.5, "agilex-serial": 0.5, "roboclaw": 0.3, "roboteq"
 STOPPING_S = 0.7
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", HIL_BASES)
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
 def test_every_fault_of_every_chassis_ends_in_a_base_that_stands_until_consent(
     kind: str, fault: Fault

@@ -109,6 +109,8 @@ def test_at_speed_an_arc_is_only_as_tight_as_the_yaw_rate_admits() -> None:
         (MotionRequest(Kind.ARC, 0.5), Twist(0.5, 0.0), "requested", "stands before it can drive on"),
     ],
 )
-def test_why_the_robot_stops(asked: MotionRequest, requested: Twist | None, rule: str, sentence: str) -> None:
+def test_the_reason_of_a_stop_names_the_rule_and_what_was_asked(
+    asked: MotionRequest, requested: Twist | None, rule: str, sentence: str
+) -> None:
     reason = stop_reason_of(asked, requested)
     assert (reason.rule, reason.sentence) == (rule, sentence)

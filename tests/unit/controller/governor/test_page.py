@@ -89,7 +89,7 @@ def test_the_keys_it_names_exist() -> None:
         assert key in fields
 
 
-def test_the_numbers_it_gives() -> None:
+def test_the_numbers_of_the_page_are_those_of_the_code() -> None:
     assert f"more than {MOST_BYTES} bytes" in PAGE
     assert f"at most {MOST_MPS:g} of either" in PAGE
     assert f"moved on by {_TRAVEL_M:g} m" in PAGE

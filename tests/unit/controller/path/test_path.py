@@ -216,3 +216,18 @@ def test_a_point_beside_the_path_is_found_again(s: float, d: float) -> None:
 def test_nowhere_on_the_path_there_is_no_speed() -> None:
     with pytest.raises(ValueError, match="is not known"):
         HOOK.speed_limit(math.nan)
+
+
+def test_the_path_ahead_is_told_in_the_body_frame() -> None:
+    straight = path(line(20.0))
+    points = straight.ahead(5.0, PlanarPose(5.0, 0.2, 0.0))
+    assert points[0] == pytest.approx([0.0, -0.2])
+    assert points[-1] == pytest.approx([12.0, -0.2])
+    near_end = straight.ahead(19.0, PlanarPose(19.0, 0.0, 0.0))
+    assert near_end[-1] == pytest.approx([1.0, 0.0])
+
+
+def test_a_bend_ahead_bends_to_its_side() -> None:
+    points = path(arc(5.0, 90.0)).ahead(0.0, PlanarPose(0.0, 0.0, 0.0))
+    assert points[-1] == pytest.approx([5.0, 5.0], abs=1e-6)
+    assert np.all(np.diff(points[:, 1]) >= 0.0)

@@ -5,12 +5,8 @@ import weakref
 from pathlib import Path as FilePath
 
 import cv2
-import numpy as np
 import pytest
 
-from config.path import ArcSpec, LineSpec, PathSpec
-from config.robot import Robot
-from controller.path.path import Path
 from controller.perceive import Look
 from controller.record.observations import ObservationFile
 from controller.record.recorder import (
@@ -19,13 +15,13 @@ from controller.record.recorder import (
     RecordingOptions,
     RunRecorder,
     open_recorder,
-    path_ahead,
 )
-from hal.types import ColourImage, PlanarPose
+from hal.types import ColourImage
+from tests.support.floor_bodies import line_path
 from tests.support.runner_doubles import EmptyScenePerceiver, PeriodicCamera, control_step
 from tests.support.video_moments import AROUND, frame
 
-STRAIGHT = Path(PathSpec(segments=(LineSpec(kind="line", length_m=20.0),)), Robot())
+STRAIGHT = line_path(20.0)
 
 
 def written(path: FilePath) -> list[dict[str, object]]:
@@ -115,21 +111,6 @@ def test_a_video_gets_one_picture_a_look(tmp_path: FilePath) -> None:
     video = cv2.VideoCapture(str(tmp_path / "v.mp4"))
     assert int(video.get(cv2.CAP_PROP_FRAME_COUNT)) == 3
     video.release()
-
-
-def test_the_path_ahead_is_told_in_the_body_frame() -> None:
-    points = path_ahead(STRAIGHT, 5.0, PlanarPose(5.0, 0.2, 0.0))
-    assert points[0] == pytest.approx([0.0, -0.2])
-    assert points[-1] == pytest.approx([12.0, -0.2])
-    near_end = path_ahead(STRAIGHT, 19.0, PlanarPose(19.0, 0.0, 0.0))
-    assert near_end[-1] == pytest.approx([1.0, 0.0])
-
-
-def test_a_bend_ahead_bends_to_its_side() -> None:
-    bend = Path(PathSpec(segments=(ArcSpec(kind="arc", radius_m=5.0, angle_deg=90.0),)), Robot())
-    points = path_ahead(bend, 0.0, PlanarPose(0.0, 0.0, 0.0))
-    assert points[-1] == pytest.approx([5.0, 5.0], abs=1e-6)
-    assert np.all(np.diff(points[:, 1]) >= 0.0)
 
 
 def test_the_last_frames_have_the_last_speeds_and_the_ending(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -137,7 +137,7 @@ def test_only_motion_commands_keep_it_going() -> None:
     assert bench.plant.twist[0] == pytest.approx(0.0, abs=1e-3)
 
 
-def test_system_state_counts() -> None:
+def test_the_system_state_counts_its_messages() -> None:
     bench = Bench()
     states = [message for message in bench.run(30_000) if isinstance(message, SystemState)]
     assert [state.count for state in states[:300]] == [k % 256 for k in range(300)]

@@ -119,7 +119,7 @@ def test_switches_report_and_do_nothing_else() -> None:
     assert bench.frame()[1][2] == 0
 
 
-def test_left_alone_it_stops() -> None:
+def test_without_commands_the_base_stops_after_its_time_out() -> None:
     bench = Bench()
     bench.keep(drive(300, 0))
     bench.after(300)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from config.perception import DepthNoise
+from config.perception import DepthNoise, MotionSettings
 from tests.support.detections import detection
 from tests.support.grids import grid_of, labelled, nearest, plate
 from vision.bodies import sightings
@@ -118,7 +118,7 @@ def test_a_velocity_that_nothing_has_is_forgotten_unless_it_is_that_of_a_known_m
     tracks.state[:, 5] = -2.5, -2.3, -2.5
     tracks.surface_state[:, 5] = -2.3, -2.5, -2.5
     tracks.moving[2] = True
-    sightings.forget_implausible(tracks, 2.4, 1.5)
+    sightings.forget_implausible(tracks, MotionSettings(max_speed_mps=1.5))
     assert tracks.state[:, 5].tolist() == [0.0, -2.3, -2.5]
     assert tracks.surface_state[:, 5].tolist() == [-2.3, 0.0, -2.5]
     np.testing.assert_array_equal(tracks.state[:, :3], [[1.0, 0.5, 8.0]] * 3)

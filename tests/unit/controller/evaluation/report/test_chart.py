@@ -38,7 +38,7 @@ def test_corners_of_the_data_are_corners_of_the_plot() -> None:
     assert corners.tolist() == [[plot.x, plot.bottom - 1], [plot.right - 1, plot.y]]
 
 
-def test_logarithmic_axis() -> None:
+def test_decades_of_a_logarithmic_axis_are_equally_far_apart() -> None:
     axis = Axis("ms", 1.0, 100.0, log=True)
     assert axis.position(np.array([1.0, 10.0, 100.0])).tolist() == pytest.approx([0.0, 0.5, 1.0])
     assert math.isnan(axis.position(np.array([0.0]))[0])
