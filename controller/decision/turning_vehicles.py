@@ -2,24 +2,27 @@
 
 A car that has backed out across the way, or a fork lift, turns where it is. Its middle does not move, so
 nothing tells the turn beforehand, and the end that was beside the robot's way comes nearer by more than the
-robot keeps free. controller/decision/world_model.py asks once a scene.
+robot keeps free. While it turns, perception may lose it, and see it again as other tracks: what begins where
+it was is taken for a part of it. controller/decision/world_model.py asks once a scene.
 """
 
 from __future__ import annotations
 
 import math
+from operator import attrgetter
 
 import numpy as np
+from numpy.typing import NDArray
 
 from controller.decision.bodies import Bodies, extended_towards
 from controller.decision.cut_movers import LEAST_AHEAD_M
 from hal.clocks import NS_PER_S
 from hal.compiled import compiled, inlined
 from hal.records import record
-from hal.types import FloatArray, Integers, PlanarPose, Vector
+from hal.types import FloatArray, Integers, Matrix, PlanarPose, Vector
 
 # Of half its length, as seen from the side. A rectangle turns within the circle through its corners: one of
-# 4.3 x 1.8 m, as one of 2.4 x 1.15 m, comes nearer by 0.64 of half its length.
+# 2.4 x 1.15 m comes nearer by 0.63 of half its length, one of 4.3 x 1.8 m by 0.66.
 _SWING_SHARE = 0.63
 _WIDER_THAN_HALF_M = 0.5  # half the width of a person with what he carries; what is wider is a vehicle
 # A faster one goes where it is seen to go, and has to slow down before it turns on the spot.
@@ -32,18 +35,30 @@ _NEVER_NS = -(2**62)
 
 @record(frozen=True, slots=True, eq=False)
 class _Known:
-    """What is known of N tracks, (N,) each.
+    """What is known of N tracks, (N,) each: those of the last scene, then vehicles that have been lost since.
 
+    xy_m: (N, 2) where it was last seen.
     set_off_ns: since when it has been moving; the time of the scene while it stands.
     moved_ns: when it was last in a motion that had lasted for some time.
     half_m, wide_ns: its greatest half width lately, and when that was seen.
     """
 
     ids: Integers
+    xy_m: Matrix
     set_off_ns: Integers
     moved_ns: Integers
     half_m: Vector
     wide_ns: Integers
+
+    def followed_by(self, other: _Known, rows: Integers) -> _Known:
+        """These tracks, followed by the rows of others."""
+        if not len(rows):
+            return self
+        pairs = zip(_arrays_of(self), _arrays_of(other), strict=True)
+        return _Known(*(np.concatenate((mine, its[rows])) for mine, its in pairs))
+
+
+_arrays_of = attrgetter(*_Known.__slots__)
 
 
 class TurningVehicles:
@@ -55,15 +70,17 @@ class TurningVehicles:
     def __init__(self, swing_allowed_m: float) -> None:
         self._swing_allowed_m = swing_allowed_m
         nobody = np.zeros(0, np.int64)
-        self._known = _Known(nobody, nobody, nobody, np.zeros(0), nobody)
+        self._known = _Known(nobody, np.zeros((0, 2)), nobody, nobody, np.zeros(0), nobody)
 
     def swing_m(self, seen: Bodies) -> FloatArray:
         """(N,) by how much more than the margin allows the ends of the tracks of a scene may come nearer.
 
         0 for whatever is no vehicle that has moved lately and is slow now.
         """
-        self._known = _Known(seen.ids, *_updated(self._known, seen))
-        return _swings(self._known, seen, self._swing_allowed_m)
+        known = _Known(seen.ids, seen.xy_m, *_updated(self._known, seen))
+        swing_m = _swings(known, seen, self._swing_allowed_m)
+        self._known = known.followed_by(self._known, _lost(self._known, seen).nonzero()[0])
+        return swing_m
 
 
 def with_swinging_ends(boxes: Bodies, swing_m: FloatArray, pose: PlanarPose, front_m: float) -> Bodies:
@@ -86,6 +103,32 @@ def _row_of(ids: Integers, one: int) -> int:
     return -1
 
 
+@inlined
+def _may_turn(known: _Known, row: int, now_ns: int) -> bool:
+    """Whether it is a vehicle that has moved lately."""
+    result: bool = known.half_m[row] > _WIDER_THAN_HALF_M and now_ns - known.moved_ns[row] <= _MOVED_NS
+    return result
+
+
+@inlined
+def _row_around(known: _Known, xy_m: FloatArray, now_ns: int) -> int:
+    """The row of a vehicle that may turn and within half a length of which xy_m lies; -1: there is none."""
+    for row in range(len(known.ids)):
+        away_m = math.hypot(known.xy_m[row, 0] - xy_m[0], known.xy_m[row, 1] - xy_m[1])
+        if away_m <= known.half_m[row] and _may_turn(known, row, now_ns):
+            return row
+    return -1
+
+
+@compiled(_Known, Bodies)
+def _lost(known: _Known, seen: Bodies) -> NDArray[np.bool_]:
+    """(N,) which of the known are vehicles that may turn, and are not seen."""
+    lost = np.zeros(len(known.ids), np.bool_)
+    for row in range(len(lost)):
+        lost[row] = _may_turn(known, row, seen.captured_ns) and _row_of(seen.ids, known.ids[row]) < 0
+    return lost
+
+
 @compiled(_Known, Bodies)
 def _updated(known: _Known, seen: Bodies) -> tuple[Integers, Integers, FloatArray, Integers]:
     """set_off_ns, moved_ns, half_m and wide_ns of the tracks seen."""
@@ -94,6 +137,8 @@ def _updated(known: _Known, seen: Bodies) -> tuple[Integers, Integers, FloatArra
     half_m, wide_ns = seen.half_across_m.copy(), np.full(count, now_ns, np.int64)
     for k in range(count):
         before = _row_of(known.ids, seen.ids[k])
+        if before < 0:
+            before = _row_around(known, seen.xy_m[k], now_ns)
         if before >= 0:
             moved_ns[k] = known.moved_ns[before]
             if seen.moving[k]:
@@ -110,8 +155,7 @@ def _swings(known: _Known, seen: Bodies, allowed_m: float) -> FloatArray:
     """As TurningVehicles.swing_m."""
     swing_m = np.zeros(len(seen.ids))
     for k in range(len(swing_m)):
-        lately = seen.captured_ns - known.moved_ns[k] <= _MOVED_NS
         slow = math.hypot(seen.measured_mps[k, 0], seen.measured_mps[k, 1]) < _SLOW_MPS
-        if lately and slow and known.half_m[k] > _WIDER_THAN_HALF_M:
+        if slow and _may_turn(known, k, seen.captured_ns):
             swing_m[k] = max(_SWING_SHARE * known.half_m[k] - allowed_m, 0.0)
     return swing_m

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from controller.decision.bodies import Bodies
+from controller.decision.bodies import Bodies, no_bodies
 from controller.decision.turning_vehicles import TurningVehicles, with_swinging_ends
 from hal.clocks import NS_PER_S
 from hal.types import PlanarPose
@@ -91,8 +92,22 @@ def test_its_length_is_remembered_while_it_turns_end_on() -> None:
     assert swing_after(*turning, seen(4.4, 0.0, 0.6)) == pytest.approx(0.63 * 0.6 - ALLOWED_M)
 
 
-def test_each_track_has_a_memory_of_its_own() -> None:
-    assert swing_after(seen(0.0, 1.0), seen(1.0, 1.0), seen(1.1, track_id=2)) == 0.0
+def test_a_track_that_begins_where_it_was_is_taken_for_it() -> None:
+    """Even if nothing was seen of it meanwhile, for as long as it may be turning."""
+    driven = seen(0.0, 1.0), seen(1.0, 1.0)
+    half = seen(2.5, 0.0, 0.6, track_id=2)
+    assert swing_after(*driven, half) == pytest.approx(SWING_M)
+    nothing = [no_bodies(round(now_s * NS_PER_S)) for now_s in (1.5, 2.0)]
+    vehicles = TurningVehicles(ALLOWED_M)
+    for scene in (*driven, *nothing):
+        vehicles.swing_m(scene)
+    assert float(vehicles.swing_m(half)[0]) == pytest.approx(SWING_M)
+    assert float(vehicles.swing_m(seen(6.1, 0.0, track_id=3))[0]) == 0.0
+
+
+def test_a_track_that_begins_elsewhere_is_another_thing() -> None:
+    elsewhere = replace(seen(1.1, track_id=2), xy_m=np.array([[4.0, -1.3]]))
+    assert swing_after(seen(0.0, 1.0), seen(1.0, 1.0), elsewhere) == 0.0
 
 
 def test_its_box_is_extended_towards_the_robot() -> None:
