@@ -24,7 +24,9 @@ from hal.types import FloatArray, Integers, Matrix, PlanarPose, Vector
 # Of half its length, as seen from the side. A rectangle turns within the circle through its corners: one of
 # 2.4 x 1.15 m comes nearer by 0.63 of half its length, one of 4.3 x 1.8 m by 0.66.
 _SWING_SHARE = 0.63
-_WIDER_THAN_HALF_M = 0.5  # half the width of a person with what he carries; what is wider is a vehicle
+# Half the length of the shortest vehicle that counts. One of 1.2 x 0.8 m comes nearer by 0.32 m, which is less
+# than the robot keeps free. Two people side by side are as wide as that.
+_LEAST_HALF_M = 0.65
 # A faster one goes where it is seen to go, and has to slow down before it turns on the spot.
 _SLOW_MPS = 0.6
 _FOR_SURE_NS = NS_PER_S  # something static that is taken for a mover is so for some frames only
@@ -106,7 +108,7 @@ def _row_of(ids: Integers, one: int) -> int:
 @inlined
 def _may_turn(known: _Known, row: int, now_ns: int) -> bool:
     """Whether it is a vehicle that has moved lately."""
-    result: bool = known.half_m[row] > _WIDER_THAN_HALF_M and now_ns - known.moved_ns[row] <= _MOVED_NS
+    result: bool = known.half_m[row] > _LEAST_HALF_M and now_ns - known.moved_ns[row] <= _MOVED_NS
     return result
 
 
