@@ -24,8 +24,8 @@ from hal.types import FloatArray, Integers, Matrix, PlanarPose, Vector
 # Of half its length, as seen from the side. A rectangle turns within the circle through its corners: one of
 # 2.4 x 1.15 m comes nearer by 0.63 of half its length, one of 4.3 x 1.8 m by 0.66.
 _SWING_SHARE = 0.63
-# Half the length of the shortest vehicle that counts. One of 1.2 x 0.8 m comes nearer by 0.32 m, which is less
-# than the robot keeps free. Two people side by side are as wide as that.
+# Half the length of the shortest vehicle that counts. One of 1.2 x 0.8 m comes nearer by 0.32 m, less than
+# the robot keeps free. Two people side by side are as wide as that.
 _LEAST_HALF_M = 0.65
 # A faster one goes where it is seen to go, and has to slow down before it turns on the spot.
 _SLOW_MPS = 0.6
