@@ -51,7 +51,7 @@ from controller.decision.worst_case_limit import WorstCase
 from hal.types import CameraMount
 
 _COARSE_S = 0.5  # step of the times beyond those of the worst case
-# A surface within this distance of a tracked obstacle, along the path, is named after it.
+# A surface within this distance of a tracked obstacle, along the path and across it, is named after it.
 _OWNED_WITHIN_M = 0.8
 # A surface this far behind the robot's front is in a place where only the robot itself can be.
 _INSIDE_M = 0.05
@@ -182,6 +182,7 @@ def _owner(known: WorldModel, surface_s_m: float, s_m: float) -> int | None:
     placed = place(unboxed, known.corridor, np.zeros(1), s_m, surface_s_m - s_m + BEYOND_RANGE_M)
     near_s = placed.s_m[:, 0] - placed.half_s_m[:, 0]
     far_s = placed.s_m[:, 0] + placed.half_s_m[:, 0]
-    off = np.maximum(np.maximum(near_s - surface_s_m, surface_s_m - far_s), 0.0)
+    beside_m = placed.clearance_m[:, 0] - max(known.sight.surface_clearance_m, 0.0)
+    off = np.maximum(np.maximum(near_s - surface_s_m, surface_s_m - far_s), np.maximum(beside_m, 0.0))
     best = int(off.argmin())
     return int(unboxed.ids[best]) if off[best] < _OWNED_WITHIN_M else None

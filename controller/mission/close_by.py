@@ -53,14 +53,15 @@ def _beside(config: AppConfig, path: Path, world: World) -> dict[str, str]:
         if distance_m < need_m - 5e-3 and distance_m < nearest.get(found.name, (need_m, 0.0))[0]:
             nearest[found.name] = (distance_m, s_m)
     return {
-        name: _passing(_called(name, world), distance_m, s_m, lateral_m, need_m)
+        name: _passing(_called(name, world), _moves(name, world), distance_m, s_m, lateral_m, need_m)
         for name, (distance_m, s_m) in nearest.items()
     }
 
 
-def _passing(what: str, distance_m: float, s_m: float, lateral_m: float, need_m: float) -> str:
+def _passing(what: str, moves: bool, distance_m: float, s_m: float, lateral_m: float, need_m: float) -> str:
     if distance_m <= 0.0:
-        return f"the robot would touch {what} {s_m:.1f} m along the path, and will wait before it"
+        there = ", if it is there first" if moves else ""
+        return f"the robot would touch {what} {s_m:.1f} m along the path, and will wait before it{there}"
     waits = "will" if distance_m < lateral_m else "may"
     return (
         f"passes {distance_m:.2f} m from {what}, {s_m:.1f} m along the path; "
@@ -85,5 +86,8 @@ def _behind_target(config: AppConfig, path: Path, world: World) -> dict[str, str
 def _called(name: str, world: World) -> str:
     if name == BUILDING:
         return "a wall of the room"
-    moves = any(body.name == name and body.motion is not None for body in world.scenario.bodies)
-    return f"{name!r} where it ends" if moves else repr(name)
+    return f"{name!r} where it ends" if _moves(name, world) else repr(name)
+
+
+def _moves(name: str, world: World) -> bool:
+    return any(body.name == name and body.motion is not None for body in world.scenario.bodies)

@@ -72,6 +72,15 @@ def test_a_plain_wall_stops_by_depth_alone() -> None:
     assert decision.reason.distance_m == pytest.approx(2.5 + 0.45 - 0.51)
 
 
+@pytest.mark.parametrize(("y_m", "name"), [(1.2, "obstacle 5"), (3.2, "a surface")])
+def test_a_surface_is_named_after_the_large_thing_that_it_belongs_to(y_m: float, name: str) -> None:
+    """A wall of 2 m that stands across the way, or 1.8 m beside it at the same distance."""
+    wall = obstacle(2.9, y_m, size_m=(2.0, 1.7))
+    decision = Bench().settle(wall, v_mps=1.2, free=free_space(nearest_m=2.5, known_m=2.5))
+    assert decision.reason.rule == "depth"
+    assert decision.reason.sentence.startswith(f"{name} stands on the path")
+
+
 @pytest.mark.parametrize(
     ("nearest_m", "told"),
     [

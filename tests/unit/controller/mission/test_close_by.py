@@ -58,7 +58,11 @@ def test_a_crate_too_near_is_told_with_place_and_need(gap_m: float, told: str, t
 @pytest.mark.parametrize(
     ("x_m", "told"),
     [
-        (4.0, "the robot would touch 'crate X' where it ends 3.2 m along the path, and will wait before it"),
+        (
+            4.0,
+            "the robot would touch 'crate X' where it ends 3.2 m along the path, and will wait before it, "
+            "if it is there first",
+        ),
         (9.0, "'crate X' where it ends stands less than margins.stop_m (0.45 m) behind the target"),
     ],
 )
