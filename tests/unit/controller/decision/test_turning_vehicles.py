@@ -123,3 +123,20 @@ def test_it_is_not_extended_to_what_the_front_has_passed() -> None:
     assert float(near.xy_m[0, 0] - near.half_view_m[0]) == pytest.approx(2.5 + FRONT_M + 0.3)
     beside = with_swinging_ends(seen(0.0), np.array([SWING_M]), PlanarPose(3.0, 0.0, 0.0), FRONT_M)
     assert float(beside.xy_m[0, 0] - beside.half_view_m[0]) == 3.5
+
+
+def test_who_steps_out_before_a_wide_crate_is_not_as_wide() -> None:
+    """He begins where the crate is seen, which never moved, walks for a second and stops."""
+    walks = [seen(now_s, 1.0, 0.3, track_id=2) for now_s in (1.0, 2.0)]
+    assert swing_after(seen(0.0), *walks, seen(2.1, 0.0, 0.3, track_id=2)) == 0.0
+
+
+def test_only_vehicles_that_may_turn_are_remembered_out_of_sight() -> None:
+    vehicles = TurningVehicles(ALLOWED_M)
+    person = replace(seen(0.5, 1.0, 0.3, track_id=2), xy_m=np.array([[9.0, 0.0]]))
+    for scene in (person, seen(1.0, 1.0), seen(2.0, 1.0)):
+        vehicles.swing_m(scene)
+    vehicles.swing_m(no_bodies(round(2.1 * NS_PER_S)))
+    assert vehicles._known.ids.tolist() == [1]
+    vehicles.swing_m(no_bodies(round(7.1 * NS_PER_S)))
+    assert vehicles._known.ids.tolist() == []

@@ -89,6 +89,16 @@ def test_a_strip_is_no_body_unless_it_moves() -> None:
     assert after((obstacle(4.0, 0.1, number=6, size_m=(0.04, 0.3)),)).bodies.ids.tolist() == [6]
 
 
+def test_a_large_thing_that_stands_is_no_body_unless_it_is_a_vehicle_that_has_just_stopped() -> None:
+    """2.4 m across the way. Its box then begins nearer, by what its ends may swing beyond the margin."""
+    stands = obstacle(4.0, 0.0, number=6, size_m=(2.4, 1.7))
+    assert not len(after(*[(stands,)] * 3).bodies)
+    drives = obstacle(4.0, 0.0, 0.0, 1.0, number=6, size_m=(2.4, 1.7))
+    bodies = after(*[(drives,)] * 32, (stands,)).bodies
+    assert bodies.ids.tolist() == [6]
+    assert float(bodies.xy_m[0, 0] - bodies.half_view_m[0]) == pytest.approx(3.9 - (0.63 * 1.2 - 0.25))
+
+
 def test_body_that_leaves_the_view_is_remembered_wider_than_its_last_strip() -> None:
     """A crate at the edge of the view, of which less and less is in it."""
     crate = obstacle(2.0, 0.9)
