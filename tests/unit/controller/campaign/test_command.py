@@ -94,6 +94,21 @@ def test_a_report_of_more_missions_than_asked_for_says_so(small: Path, tmp_path:
     assert "holds 1 missions more than this command asks for" in told
 
 
+def test_our_failures_are_named_and_the_report_tells_how_to_repeat_them(tmp_path: Path) -> None:
+    alone = ("--families", "empty_aisle", "--policies", "ours", "--workers", "1", "--quiet")
+    given = ("--missions", "1", "--seed", "3", "--report", tmp_path, *alone)
+    code, told = campaign(*given)
+    assert (code, "failed" in told) == (0, False)
+    row = rows(tmp_path)[0] | {"contacts": 1, "contacts_at_fault": 1, "touched": ["pallet"]}
+    (tmp_path / MISSIONS).write_text(json.dumps(row) + "\n")
+    code, told = campaign(*given, "--resume")
+    assert code == 1
+    assert "failed   empty_aisle:3 (ours)" in told
+    text = (tmp_path / "report.md").read_text()
+    assert "`treadwatch campaign --mode noise --only MISSION --policies POLICY`" in text
+    assert "| empty_aisle:3 | ours | touched pallet while driving |" in text
+
+
 def test_two_workers_find_what_one_finds(small: Path) -> None:
     tasks = [
         Task(one.family, one.seed, ("field", "paper"), "noise", CONFIG)
