@@ -25,7 +25,7 @@ from config.chassis import CanLinkConfig
 from config.loader import CONFIG_DIR
 from controller.errors import UserError
 from controller.mission.options import MissionOptions
-from controller.realtime.mission import drive_realtime
+from controller.mission.realtime_drive import drive_realtime
 from controller.realtime.service import handlers_kept
 from controller.terminal.console import Console
 from controller.terminal.outlet import say_result

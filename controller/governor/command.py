@@ -18,12 +18,12 @@ from controller.mission.options import MissionOptions
 from controller.mission.possible_world import require_possible_world
 from controller.mission.result import DriveResult
 from controller.mission.scenario_faults import unused_faults_warning
+from controller.mission.summary import drive_rows
 from controller.realtime.rig import realtime_rig
 from controller.realtime.service import ServiceManager
 from controller.record.observations import STANDARD_OUTPUT
 from controller.record.tally import SetpointTally
 from controller.terminal.console import Console
-from controller.terminal.summary import drive_rows
 
 
 @dataclass(kw_only=True)
@@ -66,7 +66,7 @@ def _govern(
     console: Console,
 ) -> Governing:
     with (
-        realtime_rig(config, runner, options) as rig,
+        realtime_rig(config, runner, options.recording()) as rig,
         open_commands(config) as link,
     ):
         inbox = Inbox(link, governor, console.event)

@@ -2,12 +2,13 @@
 
 The files in the order in which they come into play:
 
-* command.py - checks, drives in lock-step or in real time (realtime/mission.py), prints the summary
+* command.py - loads and checks, drives, prints the summary
 * scenario_faults.py - the slip and the vibration that a scenario asks for
 * possible_world.py - refuses a simulated world in which the robot cannot drive
 * short_arcs.py - warns of arcs whose angle was given in radians
 * close_by.py - warns of what stands too near to the path of a simulation
 * blind_bends.py - warns of bends that the camera cannot see round
+* lockstep_drive.py - a drive in simulated time; realtime_drive.py - one in the rig of controller/realtime
 * options.py - what it is told on the command line
-* result.py - its result, added up from step to step
+* result.py - its result, added up from step to step; summary.py - what is printed of it
 """

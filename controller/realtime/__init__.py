@@ -2,8 +2,8 @@
 
 The files in the order in which they come into play:
 
-* mission.py - a drive along a path; the governor (controller/governor/command.py) begins in rig.py
-* rig.py - chassis, simulated world, perception process and signals around the loop
+* rig.py - chassis, simulated world, perception process and signals around the loop; drives along a path
+  (controller/mission/realtime_drive.py) and the governor (controller/governor/command.py) begin here
 * channel.py - a channel between the two processes; messages.py - what goes over it
 * perception_process.py - camera, detect, track, recording, in a process of their own
 * service.py - readiness, watchdog and stop signals (systemd)

@@ -16,7 +16,6 @@ from controller.base.drive_lifecycle import DriveLifecycle, Outcome
 from controller.build import build_path, build_simulation, require_camera
 from controller.build_chassis import build_base
 from controller.control import Drive
-from controller.mission.options import MissionOptions
 from controller.realtime.channel import Channel, channel_sockets
 from controller.realtime.perception_link import PerceptionLink
 from controller.realtime.perception_process import perceive_forever
@@ -47,6 +46,7 @@ class DriveWithLifecycle(Drive, Protocol):
 class RealtimeRig:
     """The parts of a drive.
 
+    recording: the files that the perception process writes.
     start_ns: time zero of a simulated world.
     chassis: open; sends each command at a fixed time within its period.
     simulation: the world of a simulated camera; None with a real one.
@@ -56,7 +56,7 @@ class RealtimeRig:
 
     config: AppConfig
     runner: RealtimeRunner
-    options: MissionOptions
+    recording: RecordingOptions
     clock: MonotonicClock
     start_ns: int
     chassis: PunctualChassis
@@ -76,7 +76,7 @@ class RealtimeRig:
         service = ServiceManager(os.environ, os.getpid())
         stop = StopRequest().listen()
         with (
-            perception_beside(self.config, self.start_ns, self.options.recording()) as link,
+            perception_beside(self.config, self.start_ns, self.recording) as link,
             console.beside_a_drive(),
         ):
             # After all else, so that processes and threads started before keep ordinary scheduling.
@@ -131,10 +131,12 @@ def _why_over(lifecycle: DriveLifecycle) -> str:
 
 
 @contextmanager
-def realtime_rig(config: AppConfig, runner: RealtimeRunner, options: MissionOptions) -> Iterator[RealtimeRig]:
+def realtime_rig(
+    config: AppConfig, runner: RealtimeRunner, recording: RecordingOptions
+) -> Iterator[RealtimeRig]:
     """Open the base, and the simulated world if there is one. Raises ConfigError, HalError, UserError."""
     require_camera(config)
-    require_writable(options.recording())
+    require_writable(recording)
     clock = MonotonicClock()
     start_ns = clock.now_ns() + round(HEAD_START_S * NS_PER_S)
     start = build_path(config).start
@@ -150,7 +152,7 @@ def realtime_rig(config: AppConfig, runner: RealtimeRunner, options: MissionOpti
         yield RealtimeRig(
             config=config,
             runner=runner,
-            options=options,
+            recording=recording,
             clock=clock,
             start_ns=start_ns,
             chassis=punctual,

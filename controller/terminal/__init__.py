@@ -2,5 +2,4 @@
 
 * outlet.py - the standard streams; a reader that stops neither blocks nor ends a drive
 * console.py - progress line, events, warnings, summary
-* summary.py - what is reported of a drive, and its summary
 """

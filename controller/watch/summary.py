@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from config.app import AppConfig
-from controller.terminal.summary import perception_rows
+from controller.mission.summary import perception_rows
 from controller.watch.loop import WatchLoop
 from controller.watch.result import WatchResult
 from controller.watch.view import base_text, floor_text, odometry_text

@@ -15,7 +15,8 @@ from typing import Any
 
 from config.app import LockstepRunner, load_app
 from config.loader import CONFIG_DIR
-from controller.mission.command import drive_lockstep, with_overrides
+from controller.mission.command import with_overrides
+from controller.mission.lockstep_drive import drive_lockstep
 from controller.mission.options import MissionOptions
 from controller.replay.command import ReplayOptions, run_replay
 from controller.terminal.console import Console

@@ -14,7 +14,7 @@ from config.camera import SimulatedCameraConfig
 from config.loader import CONFIG_DIR
 from controller.build import build_faults, build_simulation, open_camera, open_faulty_camera
 from controller.build_chassis import build_base
-from controller.mission.command import drive_lockstep
+from controller.mission.lockstep_drive import drive_lockstep
 from controller.mission.options import MissionOptions
 from controller.mission.scenario_faults import unused_faults_warning, with_scenario_faults
 from controller.terminal.console import Console

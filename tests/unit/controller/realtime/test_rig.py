@@ -15,7 +15,6 @@ from config.loader import CONFIG_DIR
 from controller.base.drive_lifecycle import Outcome
 from controller.build import build_control
 from controller.control import ControlLoop
-from controller.mission.options import MissionOptions
 from controller.realtime import rig as realtime_rig
 from controller.realtime.channel import Channel, PeerGone, channel_sockets
 from controller.realtime.messages import CutOff
@@ -36,9 +35,7 @@ def rig_of(chassis: ObedientChassis) -> tuple[RealtimeRig, ControlLoop]:
     config, clock = load_app(path), MonotonicClock()
     assert isinstance(config.runner, RealtimeRunner)
     punctual = PunctualChassis(chassis, clock, 20_000_000)
-    rig = RealtimeRig(
-        config, config.runner, MissionOptions(Path(path)), clock, 0, punctual, None, Punctuality()
-    )
+    rig = RealtimeRig(config, config.runner, RecordingOptions(), clock, 0, punctual, None, Punctuality())
     return rig, build_control(config, punctual)
 
 

@@ -1,4 +1,4 @@
-"""Drives along a path in real time; called by `treadwatch run` (controller/mission/command.py)."""
+"""Drives along a path in real time; called by controller/mission/command.py."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from controller.base.drive_lifecycle import Outcome
 from controller.build import build_control
 from controller.mission.options import MissionOptions
 from controller.mission.result import MissionResult
+from controller.mission.summary import report
 from controller.realtime.rig import realtime_rig
 from controller.record.tally import SetpointTally
 from controller.terminal.console import Console
-from controller.terminal.summary import report
 from hal.errors import DeviceRefused
 from hal.types import ChassisMode
 
@@ -20,7 +20,7 @@ def drive_realtime(
     config: AppConfig, runner: RealtimeRunner, options: MissionOptions, console: Console
 ) -> MissionResult:
     """Drive the mission. Raises ConfigError, HalError or UserError only if nothing has moved."""
-    with realtime_rig(config, runner, options) as rig:
+    with realtime_rig(config, runner, options.recording()) as rig:
         loop = build_control(config, rig.chassis)
         result = MissionResult(
             loop=loop,

@@ -6,10 +6,10 @@ from config.app import load_app
 from config.loader import CONFIG_DIR
 from controller.build import build_control
 from controller.mission.result import MissionResult
+from controller.mission.summary import length_text, report, summary_rows
 from controller.record.tally import SetpointTally
 from controller.shape import SpeedShaper
 from controller.terminal.console import Console
-from controller.terminal.summary import length_text, report, summary_rows
 from hal.types import ChassisState, Setpoint
 from tests.support.obedient_chassis import PERIOD_S, ObedientChassis
 from tests.support.scenes import scene
