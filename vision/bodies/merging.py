@@ -1,7 +1,7 @@
 """Merging of two tracks that are one body: pairs_to_merge finds the pairs, merge_labels relabels their cells.
 
-Each rule looks at all pairs of a suspect or mover and a larger moving track at once. It is
-called by vision/bodies/regrouping.py, before division. Terms: vision/__init__.py.
+Each of the three rules looks at all pairs of a suspect or mover and a larger moving track at once. Called by
+vision/bodies/regrouping.py, before division. Terms: vision/__init__.py.
 """
 
 from __future__ import annotations
@@ -12,16 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.types import FloatArray
-from vision.bodies.boxes import (
-    LOAD_GAP_M,
-    SEEN_THROUGH_GAP_M,
-    boxes,
-    farther_between,
-    nearer_between,
-    relations,
-)
+from vision.bodies.boxes import boxes, farther_between, relations
 from vision.bodies.division import second_body
-from vision.bodies.sizes import LOW_BESIDE, SINGLE_WIDTH_M
+from vision.bodies.sizes import SINGLE_WIDTH_M
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import BoolGrid, DepthGrid
 from vision.depth.regions import Regions
@@ -31,18 +24,9 @@ BoolArray = NDArray[np.bool_]
 # Maximum gaps between two tracks, in space.
 _CLOSE_M = 0.25  # where depth is missing beside a body
 _CLOSE_OVERLAPPING_M = 0.40  # where one is seen in front of the other
-_TOUCHING_M = 0.1  # where only noise separates the two
 _PIECES_M = 0.8  # between the edges of a vehicle's plain side, on which depth sees nothing
-_PARTED_M = 1.0  # between pieces one above the other: what hides the middle is not larger
 _FAR_END_M = 2.0  # between a vehicle's near side and its far end: the width of a van
 _FAR_END_PX = 32.0  # maximum width of what is seen of that end, which stereo matching widens by 8 to 10 px
-_SAME_DEPTH_M = 0.4  # maximum difference in depth of pieces one above the other, and of halves
-_HIDDEN_M = 1.3  # maximum gap between the halves of a vehicle: what hides its middle is not larger
-_HALVES_MPS = 0.6  # maximum difference of the halves' velocities
-_HALVES_SHARE = 0.6  # the same, as a share of the slower one's speed
-# Of two pieces above each other this share of the narrower width has to overlap; of two halves side by side,
-# this share of the lower height.
-_MIN_OVERLAP_SHARE = 0.5
 _SMALL_SHARE = 0.5  # of the larger track's cells: with more, the smaller one is a body of its own
 _TINY_SHARE = 0.1  # of the larger track's cells: a dog beside its owner has more
 _OVERLAP = 0.5  # of the smaller box: people side by side overlap less
@@ -58,39 +42,29 @@ class _Pairs:
     """K pairs of a smaller and a larger track, (K,) each.
 
     small_px, large_px: their boxes in the image, u0, v0, u1, v1, (K, 4).
-    gap_m, stacked, within: see Relations.
+    gap_m: see Relations.
     away_m: difference of their depths.
     farther: the small one is farther away.
     overlapping: at least half of the small box is within the large one in the image.
     size_plausible: by their sizes they could be one body.
     tiny: the small one is, compared with the large one.
     wide: one of the two is wider than a person.
-    person_width: together they are no wider than a single person.
     moves: the large one does, faster than anything static seems to.
-    slower_mps: speed of the slower one.
-    differ_mps: difference of their velocities.
     velocities_compatible: their velocities do not contradict each other.
-    velocities_close, velocities_equal: their velocities are well known, and differ by _CLOSE_MPS or
-        _EQUAL_MPS at most.
+    velocities_equal: their velocities are well known, and differ by _EQUAL_MPS at most.
     """
 
     small_px: FloatArray
     large_px: FloatArray
     gap_m: FloatArray
-    stacked: BoolArray
-    within: BoolArray
     away_m: FloatArray
     farther: BoolArray
     overlapping: BoolArray
     size_plausible: BoolArray
     tiny: BoolArray
     wide: BoolArray
-    person_width: BoolArray
     moves: BoolArray
-    slower_mps: FloatArray
-    differ_mps: FloatArray
     velocities_compatible: BoolArray
-    velocities_close: BoolArray
     velocities_equal: BoolArray
 
 
@@ -111,13 +85,10 @@ def pairs_to_merge(
     if len(small) == 0:
         return []
     pairs = _paired(regions, velocity_mps, sigma_mps, small, large)
-    one = _beside(pairs) | _carried(pairs) | _seen_through(pairs) | _trolley(pairs) | _wheel(pairs)
-    halves = _halves(pairs) & ~one
-    if halves.any():
-        halves &= nearer_between(grid, regions, small, large)
-    pieces = (_pieces(pairs) | _far_end(pairs) | _above(pairs) | halves) & ~one
-    if pieces.any():
-        one |= pieces & ~farther_between(grid, regions, small, large)
+    one = _beside(pairs)
+    of_vehicle = (_piece(pairs) | _far_end(pairs)) & ~one
+    if of_vehicle.any():
+        one |= of_vehicle & ~farther_between(grid, regions, small, large)
     small, large = small[one], large[one]
     closest_first = np.lexsort((pairs.away_m[one], pairs.gap_m[one]))
     return list(zip(small[closest_first].tolist(), large[closest_first].tolist(), strict=True))
@@ -158,20 +129,14 @@ def _paired(
         small_px=regions.bbox_px[small],
         large_px=regions.bbox_px[large],
         gap_m=relation.gap_m,
-        stacked=relation.stacked,
-        within=relation.within,
         away_m=np.abs(behind_m),
         farther=behind_m > 0.0,
         overlapping=overlapping,
         size_plausible=(cells[small] <= _SMALL_SHARE * cells[large]) | person_width | overlapping,
         tiny=cells[small] <= _TINY_SHARE * cells[large],
         wide=np.maximum(regions.extent_m[small, 0], regions.extent_m[large, 0]) > SINGLE_WIDTH_M,
-        person_width=person_width,
         moves=squared_mps[large] > _MIN_MOVING_MPS**2,
-        slower_mps=np.sqrt(np.minimum(squared_mps[small], squared_mps[large])),
-        differ_mps=differ_mps,
         velocities_compatible=differ_mps <= _CLOSE_MPS + _COMPATIBLE_SIGMAS * spread,
-        velocities_close=known & (differ_mps <= _CLOSE_MPS),
         velocities_equal=known & (differ_mps <= _EQUAL_MPS),
     )
 
@@ -182,34 +147,15 @@ def _beside(pairs: _Pairs) -> BoolArray:
     return pairs.velocities_compatible & pairs.size_plausible & (pairs.gap_m <= reach_m)
 
 
-def _carried(pairs: _Pairs) -> BoolArray:
-    """(K,) a load on its carrier, even if it is farther back, as the mast of a cart is."""
-    return pairs.stacked & pairs.velocities_equal & pairs.size_plausible & (pairs.gap_m <= LOAD_GAP_M)
-
-
-def _seen_through(pairs: _Pairs) -> BoolArray:
-    """(K,) the far side of a vehicle, seen through it, with much the same velocity."""
-    return pairs.within & pairs.velocities_close & (pairs.gap_m <= SEEN_THROUGH_GAP_M)
-
-
-def _trolley(pairs: _Pairs) -> BoolArray:
-    """(K,) a trolley: low beside a mover, touching it, with much the same velocity."""
-    rows, rows_beside = (px[:, 3] - px[:, 1] for px in (pairs.small_px, pairs.large_px))
-    return pairs.velocities_close & (rows <= LOW_BESIDE * rows_beside) & (pairs.gap_m <= _TOUCHING_M)
-
-
-def _wheel(pairs: _Pairs) -> BoolArray:
-    """(K,) a wheel of a cart: tiny compared with the mover, close to it, with exactly the same velocity."""
-    return pairs.tiny & pairs.moves & pairs.velocities_equal & (pairs.gap_m <= _PIECES_M)
-
-
-def _pieces(pairs: _Pairs) -> BoolArray:
-    """(K,) pieces of a vehicle: wider than a person, with exactly the same velocity.
+def _piece(pairs: _Pairs) -> BoolArray:
+    """(K,) a piece of a vehicle wider than a person, with exactly the same velocity.
 
     They are one body if nothing farther is seen between them: of the plain side of a vehicle a depth camera
-    sees only the edges.
+    sees only the edges. Whoever walks beside a low vehicle is taller in the image than it.
     """
-    return pairs.wide & pairs.moves & pairs.velocities_equal & (pairs.gap_m <= _PIECES_M)
+    rows, rows_beside = (px[:, 3] - px[:, 1] for px in (pairs.small_px, pairs.large_px))
+    rigid = pairs.wide & pairs.moves & pairs.velocities_equal
+    return rigid & (rows <= rows_beside) & (pairs.gap_m <= _PIECES_M)
 
 
 def _far_end(pairs: _Pairs) -> BoolArray:
@@ -224,36 +170,6 @@ def _far_end(pairs: _Pairs) -> BoolArray:
     strip &= (small_px[:, 1] >= large_px[:, 1]) & (small_px[:, 3] <= large_px[:, 3])
     of_vehicle = pairs.tiny & pairs.farther & pairs.wide & pairs.moves
     return strip & of_vehicle & pairs.velocities_compatible & (pairs.gap_m <= _FAR_END_M)
-
-
-def _halves(pairs: _Pairs) -> BoolArray:
-    """(K,) halves of a vehicle behind a pillar: wider than a person, side by side at one depth.
-
-    Their velocities do not contradict each other. They are one body if something nearer, and nothing farther,
-    is seen between them.
-    """
-    most_mps = np.minimum(_HALVES_MPS, _HALVES_SHARE * pairs.slower_mps)
-    alike = pairs.velocities_compatible & (pairs.differ_mps <= most_mps)
-    close = _overlap_along(pairs, 1) & (pairs.away_m <= _SAME_DEPTH_M) & (pairs.gap_m <= _HIDDEN_M)
-    return alike & close & (pairs.slower_mps > _MIN_MOVING_MPS) & pairs.wide
-
-
-def _above(pairs: _Pairs) -> BoolArray:
-    """(K,) pieces of a person, one above the other, together no wider than a person.
-
-    Their velocities do not contradict each other. They are one body if nothing farther is seen between them.
-    """
-    over = _overlap_along(pairs, 0) & (pairs.away_m <= _SAME_DEPTH_M) & (pairs.gap_m <= _PARTED_M)
-    return over & pairs.person_width & pairs.velocities_compatible
-
-
-def _overlap_along(pairs: _Pairs, axis: int) -> BoolArray:
-    """(K,) pairs whose boxes overlap along an axis of the image, 0 (u) or 1 (v), by much of the shorter."""
-    small, large = pairs.small_px[:, axis::2], pairs.large_px[:, axis::2]
-    shared_px = np.minimum(small[:, 1], large[:, 1]) - np.maximum(small[:, 0], large[:, 0])
-    shorter_px = np.minimum(small[:, 1] - small[:, 0], large[:, 1] - large[:, 0])
-    result: BoolArray = shared_px >= _MIN_OVERLAP_SHARE * shorter_px
-    return result
 
 
 def merge_labels(

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tests.support.grids import grid_of, wall
-from tests.support.parts import ARM, CART, FAR_WHEEL, MAST, PERSON, Body, regions
+from tests.support.parts import ARM, PERSON, Body, regions
 from vision.bodies.merging import pairs_to_merge
 
 
@@ -105,45 +105,6 @@ def test_pairs_to_merge_begin_with_the_closest() -> None:
     assert merged(deep, Body(0.1, z=4.1, width=0.4), shank)[0] == (2, 1)
 
 
-def test_a_piece_above_a_mover_with_exactly_its_velocity_is_carried_by_it() -> None:
-    assert merged(CART, MAST) == [(1, 0)]
-    assert merged(CART, replace(MAST, y=-0.4)) == []  # it ends above the cart
-    assert merged(CART, replace(MAST, x=0.5, width=0.4)) == []  # and this beside it
-    assert merged(CART, replace(MAST, z=2.1)) == []  # 0.95 m behind it
-    assert merged(CART, MAST, velocity=[(0.8, 0.0, 0.0), (0.5, 0.0, 0.0)]) == []
-    assert merged(CART, MAST, sigma=0.4) == []  # not known well enough
-
-
-def test_part_behind_a_mover_with_about_its_velocity_is_merged() -> None:
-    assert merged(CART, FAR_WHEEL) == [(1, 0)]
-    assert merged(CART, FAR_WHEEL, velocity=[(0.8, 0.0, 0.0), (0.41, 0.0, 0.0)]) == [(1, 0)]
-    assert merged(CART, replace(FAR_WHEEL, x=0.8)) == []  # beside it
-    assert merged(CART, replace(FAR_WHEEL, z=2.9, y=0.6)) == []  # 1.75 m behind it
-    assert merged(CART, FAR_WHEEL, velocity=[(0.8, 0.0, 0.0), (0.39, 0.0, 0.0)]) == []
-    assert merged(CART, FAR_WHEEL, sigma=0.4) == []
-
-
-def test_low_part_beside_a_mover_with_about_its_velocity_is_merged() -> None:
-    pusher = Body(0.0, y=0.1, width=0.4, height=1.6, cells=500)
-    trolley = Body(-0.78, y=0.45, width=1.0, height=0.9, cells=400)  # 0.08 m before him, 0.56 of his height
-    assert merged(pusher, trolley) == [(1, 0)]
-    assert merged(pusher, replace(trolley, y=0.4, height=1.0)) == []  # 0.62 of it
-    assert merged(pusher, replace(trolley, x=-0.82)) == []  # 0.12 m before him, as a child may walk
-    assert merged(pusher, trolley, velocity=[(0.8, 0.0, 0.0), (0.39, 0.0, 0.0)]) == []
-    assert merged(pusher, trolley, sigma=0.4) == []  # not known well enough
-
-
-def test_tiny_part_close_to_a_mover_with_its_velocity_is_merged() -> None:
-    cart = Body(0.0, z=3.0, width=0.64, height=1.0, depth=0.6, cells=580)
-    wheel = Body(-0.42, y=0.3, z=4.0, width=0.1, height=0.2, depth=0.5, cells=58)  # 0.45 m behind it
-    assert merged(cart, wheel) == [(1, 0)]
-    assert merged(cart, replace(wheel, cells=59)) == []
-    assert merged(cart, replace(wheel, x=-1.1)) == []  # 0.86 m
-    assert merged(cart, wheel, velocity=[(0.8, 0.0, 0.0), (0.5, 0.0, 0.0)]) == []
-    assert merged(cart, wheel, velocity=[(0.29, 0.0, 0.0)] * 2) == []  # as slow as what stands
-    assert merged(cart, wheel, sigma=0.4) == []  # not known well enough
-
-
 REAR = Body(-0.6, z=3.0, width=1.0, height=1.2, depth=0.1, cells=900)
 WHEEL = Body(0.6, y=0.3, z=3.2, width=0.4, height=0.6, depth=0.1, cells=480)  # 0.51 m from the rear
 
@@ -160,6 +121,12 @@ def test_pieces_of_something_wide_with_nothing_seen_between_them_are_one() -> No
     assert merged(REAR, WHEEL, behind_m=0.0, velocity=[(0.8, 0.0, 0.0), (0.5, 0.0, 0.0)]) == []
     # Hardly anything moves so slowly that it would not go like what stands.
     assert merged(REAR, WHEEL, behind_m=0.0, velocity=[(0.29, 0.0, 0.0)] * 2) == []
+
+
+def test_somebody_taller_beside_a_low_vehicle_is_no_piece_of_it() -> None:
+    low = replace(REAR, y=0.3, height=0.6)
+    assert merged(low, replace(WHEEL, y=0.3, z=3.0, height=0.6), behind_m=0.0) == [(1, 0)]
+    assert merged(low, replace(WHEEL, y=0.3, z=3.0, height=0.62), behind_m=0.0) == []
 
 
 VAN = Body(-1.0, z=3.1, width=1.15, height=1.5, depth=0.4, cells=3300)
@@ -182,51 +149,6 @@ def test_far_end_of_a_vehicle_beside_its_near_side_belongs_to_it() -> None:
     assert merged(replace(VAN, x=-0.8, width=0.8), FAR_END, behind_m=4.0) == []  # as narrow as a person
     assert merged(VAN, FAR_END, velocity=[(0.8, 0.0, 0.0), (-0.8, 0.0, 0.0)], behind_m=4.0) == []
     assert merged(VAN, FAR_END, velocity=[(0.29, 0.0, 0.0)] * 2, behind_m=4.0) == []  # as slow as what stands
-
-
-LOAD = Body(-0.8, width=1.0, height=1.2, cells=900)
-CAB = Body(1.1, z=4.2, width=0.8, height=1.5, cells=800)  # 1.0 m from the load
-NEARLY = [(0.8, 0.0, 0.0), (0.8, 0.0, 0.45)]
-
-
-def test_halves_of_a_vehicle_on_both_sides_of_a_pillar_are_one() -> None:
-    """First seen so, nothing but the pillar between them, and their velocities hardly known yet."""
-    assert merged(LOAD, CAB, velocity=NEARLY, behind_m=2.0) == [(1, 0)]
-    assert merged(LOAD, CAB, velocity=NEARLY, behind_m=4.1) == []  # no pillar: their own depth
-    assert merged(LOAD, CAB, velocity=NEARLY, behind_m=0.0) == []
-    assert merged(LOAD, CAB, velocity=NEARLY, behind_m=6.0) == []  # two vehicles
-    assert merged(replace(LOAD, x=-0.7, width=0.8), CAB, velocity=NEARLY, behind_m=2.0) == []  # two people
-    assert merged(LOAD, replace(CAB, x=1.35), velocity=NEARLY, behind_m=2.0) == [(1, 0)]
-    assert merged(LOAD, replace(CAB, x=1.45), velocity=NEARLY, behind_m=2.0) == []  # 1.35 m
-    assert merged(LOAD, replace(CAB, z=4.45), velocity=NEARLY, behind_m=2.0) == []
-    assert merged(LOAD, replace(CAB, y=1.0), velocity=NEARLY, behind_m=2.0) == []  # hardly beside it
-    towards = [(0.4, 0.0, 0.0), (0.3, 0.0, -0.3)]  # 0.32 m/s, of somebody who goes 0.42
-    assert merged(LOAD, CAB, velocity=towards, sigma=0.2, behind_m=2.0) == []
-    faster = [(1.2, 0.0, 0.0), (1.2, 0.0, 0.65)]
-    assert merged(LOAD, CAB, velocity=faster, sigma=0.2, behind_m=2.0) == []
-    assert merged(LOAD, CAB, velocity=[(0.8, 0.0, 0.0), (0.25, 0.0, 0.0)], sigma=0.2, behind_m=2.0) == []
-
-
-LEGS = Body(0.0, y=0.6, z=4.0, height=0.6, cells=200)
-HEAD = Body(0.05, y=-0.55, z=4.1, width=0.2, height=0.25, cells=40)  # 0.72 m above the legs
-
-
-def test_pieces_one_above_the_other_with_nothing_farther_seen_between_them_are_one() -> None:
-    """Somebody behind a board, of whom head and legs are seen."""
-    assert merged(LEGS, HEAD, behind_m=2.0) == [(1, 0)]
-    assert merged(LEGS, HEAD, behind_m=4.1) == [(1, 0)]
-    assert merged(LEGS, HEAD, behind_m=0.0) == [(1, 0)]
-    assert merged(LEGS, HEAD, behind_m=6.0) == []  # whoever is seen over him stands behind him
-    assert merged(LEGS, replace(HEAD, z=4.35), behind_m=2.0) == [(1, 0)]
-    assert merged(LEGS, replace(HEAD, z=4.45), behind_m=2.0) == []
-    assert merged(LEGS, replace(HEAD, y=-0.8), behind_m=2.0) == [(1, 0)]  # 0.98 m
-    assert merged(LEGS, replace(HEAD, y=-0.9), behind_m=2.0) == []  # 1.08 m
-    assert merged(LEGS, replace(HEAD, x=0.2), behind_m=2.0) == [(1, 0)]
-    assert merged(LEGS, replace(HEAD, x=0.25), behind_m=2.0) == []  # less than half of it above the legs
-    wide = replace(LEGS, x=0.25, width=0.9)  # together wider than anybody
-    assert merged(wide, HEAD, behind_m=2.0, velocity=[(0.8, 0.0, 0.0), (0.5, 0.0, 0.0)]) == []
-    assert merged(LEGS, HEAD, behind_m=2.0, velocity=[(0.8, 0.0, 0.0), (-0.8, 0.0, 0.0)]) == []
-    assert merged(LEGS, HEAD, behind_m=2.0, velocity=[(0.8, 0.0, 0.0), (0.5, 0.0, 0.0)]) == [(1, 0)]
 
 
 def test_tracks_that_are_not_seen_take_no_part() -> None:
