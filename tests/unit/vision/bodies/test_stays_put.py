@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from config.perception import PerceptionConfig
 from hal.types import FloatArray
@@ -35,6 +36,7 @@ def stays(
     then_m: FloatArray | None = None,
     ago_s: float = 0.6,
     distance_m: float = 4.0,
+    mask: NDArray[np.bool_] | None = None,
 ) -> bool:
     """Whether the track on the plate at distance_m stays put, if then_m was seen ago_s ago."""
     here_m = screen(distance_m) if now_m is None else now_m
@@ -43,7 +45,8 @@ def stays(
     tracks, labels = Tracks(), labelled(here_m == distance_m)
     tracks.start(np.array([[0.0, 0.0, distance_m]]), 0.2, 1.5, 1.0, 0)
     tracks.state[0, 3:], tracks.extent_m[0] = velocity_mps, (1.0, 1.2, 0.1)
-    return bool(stays_put(tracks, grid, here_m > 0, labels, memory, AT_ORIGIN, NOW_NS)[0])
+    above_floor = here_m > 0 if mask is None else mask
+    return bool(stays_put(tracks, grid, above_floor, labels, memory, AT_ORIGIN, NOW_NS)[0])
 
 
 def test_a_surface_that_is_where_it_was_stays_put_whatever_its_fragments_say() -> None:
@@ -69,12 +72,31 @@ def test_only_where_depth_tells_a_body_from_the_wall_it_goes_along() -> None:
 
 
 @pytest.mark.parametrize(
-    ("speed_mps", "gone_m", "put"), [(0.8, 0.06, True), (0.8, 0.2, False), (0.2, 0.09, False)]
+    ("speed_mps", "gone_m", "ago_s", "put"),
+    [
+        (0.8, 0.08, 0.6, True),  # 0.93 of it has stayed
+        (0.8, 0.12, 0.6, False),  # 0.88
+        (0.3, 0.08, 0.6, True),  # half of 0.18 m of way are 0.09
+        (0.3, 0.08, 0.4, False),  # of 0.12 m 0.06
+        (0.2, 0.04, 0.6, True),  # 0.99
+        (0.2, 0.08, 0.6, False),
+    ],
 )
-def test_nearly_all_of_it_must_have_stayed(speed_mps: float, gone_m: float, put: bool) -> None:
-    """0.9 of it; of 0.12 m of way 0.94, half of what should be gone."""
+def test_nearly_all_of_it_must_have_stayed(speed_mps: float, gone_m: float, ago_s: float, put: bool) -> None:
     then_m = nearest(plate(4.0, (-0.5 + gone_m, 0.5), (-0.6, 0.6)), wall(6.0))
-    assert stays((speed_mps, 0.0, 0.0), then_m=then_m) == put
+    assert stays((speed_mps, 0.0, 0.0), then_m=then_m, ago_s=ago_s) == put
+
+
+def test_floor_below_a_mover_does_not_count_as_its_surface() -> None:
+    screen_m = screen()
+    above_floor = screen_m > 0
+    assert stays(mask=above_floor)
+    above_floor[30:] = False
+    assert not stays(mask=above_floor)
+
+
+def test_what_is_not_seen_does_not_stay_either() -> None:
+    assert not stays(distance_m=4.0, now_m=wall(5.0))
 
 
 @pytest.mark.parametrize("odometry", [True, False])
