@@ -199,7 +199,7 @@ class ObstacleTally:
 
     def line(self) -> str:
         """For the summary."""
-        text = f"{len(self.seen)} seen, {len(self.moving)} of them moving"
+        text = f"{len(self.seen)} tracked (ids), {len(self.moving)} of them moving"
         return text + (f"; nearest {self.nearest_m:.2f} m ahead" if math.isfinite(self.nearest_m) else "")
 
 

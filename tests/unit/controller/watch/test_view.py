@@ -116,4 +116,4 @@ def test_summary_tells_the_median_of_all_looks_at_the_floor() -> None:
     assert rows["floor"].startswith("0.60 m below the camera")
     assert rows["floor"].endswith("median of 5 looks")
     assert rows["camera"] == "15 good"
-    assert rows["obstacles"] == "1 seen, 1 of them moving; nearest 2.99 m ahead"
+    assert rows["obstacles"] == "1 tracked (ids), 1 of them moving; nearest 2.99 m ahead"
