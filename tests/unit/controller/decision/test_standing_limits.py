@@ -53,12 +53,13 @@ def decided_after(seconds: float, v_mps: float, then_clear_m: float) -> Decision
     [
         pytest.param(1.8, 0.0, 0.17, True, id="not for long"),
         pytest.param(2.8, 0.0, 0.17, False, id="for long"),
-        pytest.param(2.8, 0.3, 0.17, True, id="the robot drives"),
+        pytest.param(1.8, 0.3, 0.17, True, id="not for long, while the robot drives"),
+        pytest.param(2.8, 0.3, 0.17, False, id="for long, while the robot drives"),
         pytest.param(2.8, 0.0, 0.14, True, id="not clear of the margin"),
         pytest.param(0.8, 0.0, 0.22, False, id="clear of the wider margin"),
     ],
 )
-def test_a_standing_robot_does_not_wait_forever_for_what_stays_clear_of_the_margin(
+def test_what_stays_clear_of_the_margin_for_two_seconds_is_no_longer_in_the_way(
     seconds: float, v_mps: float, then_clear_m: float, waits: bool
 ) -> None:
     decision = decided_after(seconds, v_mps, then_clear_m)
