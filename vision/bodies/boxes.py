@@ -19,8 +19,6 @@ from vision.depth.cells import cell_at
 from vision.depth.depth_grid import DepthGrid
 from vision.depth.regions import Regions
 
-LOAD_GAP_M = 0.8  # maximum gap between a load and its carrier: the load may begin farther back
-SEEN_THROUGH_GAP_M = 1.5  # maximum gap between a vehicle and its own far side, seen through it
 _MIN_SAMPLES = 3  # of the cells sampled between two regions: with at least this many, something is there
 _SAMPLES = 24  # cells sampled on the way from one region to another
 _STACKED_SHARE = 0.7  # of a load's width is above its carrier at least; the rest may jut out

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from hal.types import FloatArray
 from vision.bodies.births import MIN_CELLS
 from vision.bodies.sizes import (
-    LOW_BESIDE,
     NEARER_INVERSE,
     SEEN_THROUGH_HEIGHT,
     SEEN_THROUGH_SHARE,
@@ -40,6 +39,9 @@ _SHOULDERS_M = 0.36  # the width of the shoulders is measured this far below the
 _MIN_APART_M = 0.35  # minimum distance of two heads
 _PAIR_WIDTH_M = 0.7  # minimum width of two people whose heads are _MIN_APART_M apart
 _MAX_APART_M = 0.8  # maximum distance: people farther apart leave a valley
+# A group is low beside a body if it is at most this share as tall in the image: a trolley is, a child beside
+# an adult is not.
+_LOW_BESIDE = 0.6
 # Share of the image between two groups: if less shows something farther, nothing is seen there.
 _NOTHING_SEEN_SHARE = 0.2
 _MIN_GROUP = 2 * MIN_CELLS  # cells in each of two groups: twice those of a new track, as each is judged alone
@@ -200,7 +202,7 @@ def _fewer(chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 def _low_beside(small: NDArray[np.intp], large: NDArray[np.intp], width: int) -> bool:
     """Whether a small group of flat cells is much less tall in the image than the large one."""
-    return bool(np.ptp(small // width) + 1 <= LOW_BESIDE * (np.ptp(large // width) + 1))
+    return bool(np.ptp(small // width) + 1 <= _LOW_BESIDE * (np.ptp(large // width) + 1))
 
 
 def _seen_through(small: NDArray[np.intp], large: NDArray[np.intp], width: int) -> bool:

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from config.perception import DepthNoise
 from hal.compiled import compiled
 from hal.types import FloatArray, Matrix, Pose, Vector
-from vision.bodies.boxes import LOAD_GAP_M, SEEN_THROUGH_GAP_M, nearer_between, relations
+from vision.bodies.boxes import nearer_between, relations
 from vision.bodies.tracks import Tracks
 from vision.depth.depth_grid import DepthGrid
 from vision.depth.depth_noise import depth_sigma_of
@@ -30,6 +30,8 @@ from vision.numerics.pose_axes import inner_point
 
 _APART_M = 0.40  # parts farther than this from the main part belong to something else
 _CLOSE_M = 0.25  # gap that missing depth at a shoe or under an arm leaves: about the length of a hand
+_LOAD_GAP_M = 0.8  # maximum gap between a load and its carrier: the load may begin farther back
+_SEEN_THROUGH_GAP_M = 1.5  # maximum gap between a vehicle and its own far side, seen through it
 _SAME_DEPTH_M = 0.30  # besides the noise, the visible surface may lie this far from the centre in depth
 _SMALL_SHARE = 0.5  # of the larger part's cells: a new part with more is a body of its own
 # Share of a part's cells that voted for the track: from here on it stays, as a load does.
@@ -142,8 +144,8 @@ def detach(
     if len(beside) == 0:
         return winner
     relation = relations(parts, beside, main[beside])
-    carried = ((relation.gap_m <= LOAD_GAP_M) & relation.stacked) | (
-        (relation.gap_m <= SEEN_THROUGH_GAP_M) & relation.within
+    carried = ((relation.gap_m <= _LOAD_GAP_M) & relation.stacked) | (
+        (relation.gap_m <= _SEEN_THROUGH_GAP_M) & relation.within
     )
     carried &= votes[beside] >= _OWN_VOTE_SHARE * parts.cells[beside]
     far = (relation.gap_m > _APART_M) & ~expected[beside, winner[beside] - 1] & ~carried

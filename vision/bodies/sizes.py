@@ -11,6 +11,3 @@ NEARER_INVERSE = 0.02  # 1/m: something is in front of a body if its inverse dep
 SEEN_THROUGH_SHARE = 0.9
 # A group seen through another one is at most this share as tall; a person behind it is taller.
 SEEN_THROUGH_HEIGHT = 0.5
-# A group is low beside a body if it is at most this share as tall in the image: a trolley is, a child beside
-# an adult is not.
-LOW_BESIDE = 0.6
