@@ -41,13 +41,17 @@ def stays_put(
     pose: Pose,
     now_ns: int,
 ) -> Flags:
-    """(T,) tracks of which nearly all surface is where it was, although by their velocity it cannot be.
+    """(T,) movers of which nearly all surface is where it was, although by their velocity it cannot be.
 
-    mask (h, w): cells above the floor. labels (h, w): track index + 1. pose: of the camera.
+    Asked of tracks with evidence of motion. mask (h, w): cells above the floor. labels (h, w): track index + 1.
+    pose: of the camera.
     """
+    result: Flags = tracks.mover
+    if not result.any():
+        return result
     sight, distance_m = tracks.sight(pose.translation_m)
     way = _LOOK_BACK_S * _widths_per_s(tracks, sight)
-    result: Flags = (way >= _LEAST_WAY) & (memory.resolves_m(distance_m) <= _RESOLVED_M)
+    result &= (way >= _LEAST_WAY) & (memory.resolves_m(distance_m) <= _RESOLVED_M)
     if not result.any():
         return result
     around = mask & cv2.dilate(cells_of(labels, result).view(np.uint8), NEIGHBOURHOOD).view(np.bool_)

@@ -37,13 +37,14 @@ def stays(
     ago_s: float = 0.6,
     distance_m: float = 4.0,
     mask: NDArray[np.bool_] | None = None,
+    evidence: float = 1.0,
 ) -> bool:
     """Whether the track on the plate at distance_m stays put, if then_m was seen ago_s ago."""
     here_m = screen(distance_m) if now_m is None else now_m
     memory, grid = ViewMemory(CONFIG.depth_noise), grid_of(here_m)
     memory.remember(grid_of(here_m if then_m is None else then_m), AT_ORIGIN, NOW_NS - int(ago_s * 1e9))
     tracks, labels = Tracks(), labelled(here_m == distance_m)
-    tracks.start(np.array([[0.0, 0.0, distance_m]]), 0.2, 1.5, 1.0, 0)
+    tracks.start(np.array([[0.0, 0.0, distance_m]]), 0.2, 1.5, evidence, 0)
     tracks.state[0, 3:], tracks.extent_m[0] = velocity_mps, (1.0, 1.2, 0.1)
     above_floor = here_m > 0 if mask is None else mask
     return bool(stays_put(tracks, grid, above_floor, labels, memory, AT_ORIGIN, NOW_NS)[0])
@@ -57,6 +58,7 @@ def test_a_surface_that_is_where_it_was_stays_put_whatever_its_fragments_say() -
         then_m=screen(left_m=-0.98, wall_m=0.2)
     )  # a panel that slides so close along a wall is not told
     assert not stays(ago_s=1.0)  # no view of that time
+    assert not stays(evidence=0.0)  # nothing speaks for motion: not asked
 
 
 def test_motion_must_have_taken_it_a_good_part_of_its_width_across_the_line_of_sight() -> None:
