@@ -43,8 +43,8 @@ def stays_put(
 ) -> Flags:
     """(T,) movers of which nearly all surface is where it was, although by their velocity it cannot be.
 
-    Asked of tracks with evidence of motion. mask (h, w): cells above the floor. labels (h, w): track index + 1.
-    pose: of the camera.
+    Asked of tracks with evidence of motion. mask (h, w): cells above the floor. labels (h, w): track index
+    + 1. pose: of the camera.
     """
     result: Flags = tracks.mover
     if not result.any():
