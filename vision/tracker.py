@@ -4,7 +4,7 @@ Steps, with their modules: velocities of fragments (least_squares); arrived and 
 cells to tracks (masks, connected, votes, grouping, births); suspects and furniture cut out (carving,
 left_behind, cutting); movers extended to the floor (grounding); bodies joined and divided (regrouping);
 filters (sightings, rim_motion, approach); fragments to tracks (adoption); velocities of bodies
-(least_squares); surfaces that stay (stays_put); verdict (judgement); report. Terms: vision/__init__.py.
+(least_squares); verdict (judgement); report. Terms: vision/__init__.py.
 """
 
 from __future__ import annotations
@@ -36,7 +36,6 @@ from vision.bodies.few_fragments import bodies_needing_fragments
 from vision.bodies.judgement import judge
 from vision.bodies.motion_evidence import FrameMeasures, evidence_of
 from vision.bodies.regrouping import regrouped
-from vision.bodies.stays_put import stays_put
 from vision.bodies.tracks import Tracks
 from vision.depth import connected, occlusion, regions
 from vision.depth.connected import IntGrid
@@ -134,8 +133,7 @@ class Tracker:
         if detection.dt_s > 0 and len(tracks):
             body = self._fuse_fragments(detection, owner, velocities)
             arrivals = masks.count_cells(whole, changes.arrived_cells, len(tracks))
-            stays = stays_put(tracks, grid, above_floor, whole, self._free, pose, now_ns)
-            measures = FrameMeasures(body, rims, nearing, arrivals, measured.cells, keeps_area, stays)
+            measures = FrameMeasures(body, rims, nearing, arrivals, measured.cells, keeps_area)
             self._judge(detection, measures)
         self._surfaces = masks.surfaces(grid, labels, tracks.ids, pose)
         return owner

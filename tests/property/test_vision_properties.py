@@ -220,7 +220,6 @@ def any_evidence(seed: int, count: int, trusted: bool) -> MotionEvidence:
         arrived=rng.integers(0, 40, count),
         cells=rng.integers(40, 200, count),
         keeps_area=rng.random(count) < 0.7,
-        stays_put=rng.random(count) < 0.1,
         size_m=rng.uniform(0.0, 4.0, count),
         velocity_measured_s=rng.uniform(0.0, 1.0, count),
         rim_mps=rng.normal(0.0, 1.0, count),

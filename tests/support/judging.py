@@ -52,7 +52,6 @@ def one(velocity: Speed = STILL, **changes: Any) -> MotionEvidence:
         arrived=np.array([0]),
         cells=np.array([100]),
         keeps_area=np.array([True]),
-        stays_put=np.array([False]),
         size_m=np.array([0.8]),
         velocity_measured_s=np.array([0.0]),
         rim_mps=np.array([0.0]),

@@ -22,7 +22,6 @@ Files, in the order in which they come into play within one frame (vision/tracke
 * rim_motion - the speed of half hidden bodies by their free rims.
 * approach - the speed of such bodies towards the camera by the depth of their surface then and now.
 * adoption - each fragment is assigned to a track.
-* stays_put - surfaces that stay where they are, whatever moves on them.
 * motion_evidence - all evidence of one frame, for the verdict.
 * proof - what one frame proves of each track: moving, standing still or neither.
 * proof_rules - the rules for that, one function each.

@@ -1,6 +1,6 @@
 """Merging of two tracks that are one body: pairs_to_merge finds the pairs, merge_labels relabels their cells.
 
-Each of the three rules looks at all pairs of a suspect or mover and a larger moving track at once. Called by
+Each of the four rules looks at all pairs of a suspect or mover and a larger moving track at once. Called by
 vision/bodies/regrouping.py, before division. Terms: vision/__init__.py.
 """
 
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.types import FloatArray
-from vision.bodies.boxes import boxes, farther_between, relations
+from vision.bodies.boxes import boxes, farther_between, nearer_between, relations
 from vision.bodies.division import second_body
 from vision.bodies.sizes import SINGLE_WIDTH_M
 from vision.depth.connected import IntGrid
@@ -26,12 +26,17 @@ _CLOSE_M = 0.25  # where depth is missing beside a body
 _CLOSE_OVERLAPPING_M = 0.40  # where one is seen in front of the other
 _PIECES_M = 0.8  # between the edges of a vehicle's plain side, on which depth sees nothing
 _FAR_END_M = 2.0  # between a vehicle's near side and its far end: the width of a van
+_HIDDEN_M = 1.3  # between the halves of a vehicle: what hides its middle is not larger
 _FAR_END_PX = 32.0  # maximum width of what is seen of that end, which stereo matching widens by 8 to 10 px
 _SMALL_SHARE = 0.5  # of the larger track's cells: with more, the smaller one is a body of its own
 _TINY_SHARE = 0.1  # of the larger track's cells: a dog beside its owner has more
 _OVERLAP = 0.5  # of the smaller box: people side by side overlap less
+_SAME_DEPTH_M = 0.4  # maximum difference in depth of two halves
+_MIN_OVERLAP_SHARE = 0.5  # of the lower half's height, which the other one has beside it
+_HALVES_MPS = 0.6  # maximum difference of the halves' velocities
+_HALVES_SHARE = 0.6  # the same, as a share of the slower one's speed
 _EQUAL_MPS = 0.25  # maximum difference in velocity of the parts of a rigid thing
-_CLOSE_MPS = 0.4  # maximum difference in velocity of two surfaces of a rigid thing
+_CLOSE_MPS = 0.4  # maximum difference in velocity of two parts of one body, besides noise
 _KNOWN_SIGMA_MPS = 0.35  # with a larger standard deviation no two velocities are surely alike
 _COMPATIBLE_SIGMAS = 2.0  # more difference for noise: a shank that stands, or swings, on a body that moves
 _MIN_MOVING_MPS = 0.3  # a slower track moves like anything static
@@ -50,6 +55,8 @@ class _Pairs:
     tiny: the small one is, compared with the large one.
     wide: one of the two is wider than a person.
     moves: the large one does, faster than anything static seems to.
+    slower_mps: speed of the slower one.
+    differ_mps: difference of their velocities.
     velocities_compatible: their velocities do not contradict each other.
     velocities_equal: their velocities are well known, and differ by _EQUAL_MPS at most.
     """
@@ -64,6 +71,8 @@ class _Pairs:
     tiny: BoolArray
     wide: BoolArray
     moves: BoolArray
+    slower_mps: FloatArray
+    differ_mps: FloatArray
     velocities_compatible: BoolArray
     velocities_equal: BoolArray
 
@@ -86,7 +95,10 @@ def pairs_to_merge(
         return []
     pairs = _paired(regions, velocity_mps, sigma_mps, small, large)
     one = _beside(pairs)
-    of_vehicle = (_piece(pairs) | _far_end(pairs)) & ~one
+    halves = _halves(pairs) & ~one
+    if halves.any():
+        halves &= nearer_between(grid, regions, small, large)
+    of_vehicle = (_piece(pairs) | _far_end(pairs) | halves) & ~one
     if of_vehicle.any():
         one |= of_vehicle & ~farther_between(grid, regions, small, large)
     small, large = small[one], large[one]
@@ -136,6 +148,8 @@ def _paired(
         tiny=cells[small] <= _TINY_SHARE * cells[large],
         wide=np.maximum(regions.extent_m[small, 0], regions.extent_m[large, 0]) > SINGLE_WIDTH_M,
         moves=squared_mps[large] > _MIN_MOVING_MPS**2,
+        slower_mps=np.sqrt(np.minimum(squared_mps[small], squared_mps[large])),
+        differ_mps=differ_mps,
         velocities_compatible=differ_mps <= _CLOSE_MPS + _COMPATIBLE_SIGMAS * spread,
         velocities_equal=known & (differ_mps <= _EQUAL_MPS),
     )
@@ -170,6 +184,27 @@ def _far_end(pairs: _Pairs) -> BoolArray:
     strip &= (small_px[:, 1] >= large_px[:, 1]) & (small_px[:, 3] <= large_px[:, 3])
     of_vehicle = pairs.tiny & pairs.farther & pairs.wide & pairs.moves
     return strip & of_vehicle & pairs.velocities_compatible & (pairs.gap_m <= _FAR_END_M)
+
+
+def _halves(pairs: _Pairs) -> BoolArray:
+    """(K,) halves of a vehicle behind a pillar: wider than a person, side by side at one depth.
+
+    Their velocities do not contradict each other. They are one body if something nearer, and nothing farther,
+    is seen between them.
+    """
+    most_mps = np.minimum(_HALVES_MPS, _HALVES_SHARE * pairs.slower_mps)
+    alike = pairs.velocities_compatible & (pairs.differ_mps <= most_mps)
+    close = _side_by_side(pairs) & (pairs.away_m <= _SAME_DEPTH_M) & (pairs.gap_m <= _HIDDEN_M)
+    return alike & close & (pairs.slower_mps > _MIN_MOVING_MPS) & pairs.wide
+
+
+def _side_by_side(pairs: _Pairs) -> BoolArray:
+    """(K,) pairs whose boxes share much of the lower one's rows in the image."""
+    small, large = pairs.small_px[:, 1::2], pairs.large_px[:, 1::2]
+    shared_px = np.minimum(small[:, 1], large[:, 1]) - np.maximum(small[:, 0], large[:, 0])
+    lower_px = np.minimum(small[:, 1] - small[:, 0], large[:, 1] - large[:, 0])
+    result: BoolArray = shared_px >= _MIN_OVERLAP_SHARE * lower_px
+    return result
 
 
 def merge_labels(

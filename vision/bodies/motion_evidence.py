@@ -34,7 +34,6 @@ class FrameMeasures:
     fragments, rims, approach: their velocities by their fragments, free rims and depth.
     arrived, cells: number of newly arrived cells of each surface, and of all its cells, (T,).
     keeps_area: the surface has about as many cells as when it was last seen, (T,).
-    stays_put: it is where it was, whatever moves on it, (T,).
     """
 
     fragments: BodyVelocities
@@ -43,7 +42,6 @@ class FrameMeasures:
     arrived: Integers
     cells: Integers
     keeps_area: Flags
-    stays_put: Flags
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,7 +61,6 @@ class MotionEvidence:
     arrived, cells: of the surface.
     arriving_s: for how long part of the surface has been newly arrived.
     keeps_area: the surface is about as large as when it was last seen.
-    stays_put: the surface is where it was, whatever moves on it (vision/bodies/stays_put.py).
     size_m: largest extent of the surface.
     velocity_measured_s: for how long the centre has measured the velocity without a break.
     rim_mps: speed across the line of sight by its free rims, 0 where they show none.
@@ -98,7 +95,6 @@ class MotionEvidence:
     arriving_s: Vector
     cells: Integers
     keeps_area: Flags
-    stays_put: Flags
     size_m: Vector
     velocity_measured_s: Vector
     rim_mps: Vector
@@ -148,7 +144,6 @@ def evidence_of(
         arriving_s=tracks.arriving_s,
         cells=measures.cells,
         keeps_area=measures.keeps_area,
-        stays_put=measures.stays_put,
         size_m=tracks.extent_m.max(axis=1),
         velocity_measured_s=tracks.velocity_measured_s,
         rim_mps=rims.mps,

@@ -183,14 +183,13 @@ def _proofs(
         stands = not fast and filtered.sigma_mps < _KNOWN_SPEED * asked.least_mps
         stopped = moving[t] and stands
         came = (arrival.much and not stopped) or (arrival.lasting and not stands)
-        proven = (fast and is_evident(shown, asked)) or came
-        moves[t] = seen.trusted and possible and proven and not seen.stays_put[t]
+        moves[t] = seen.trusted and possible and ((fast and is_evident(shown, asked)) or came)
         strength[t] = _strength(shown, asked.threshold)
         surely_static[t] = stands_surely(shown, asked)
         # Neither depth nor a fragment tells it from the static surface beside it, along which it would drift.
         lost = moving[t] and seen.border_is_guess[t] and shown.ends.all == 0 and not arrival.some
         slow = filtered.speed_mps < STANDING_SHARE * asked.least_mps
-        over[t] = surely_static[t] or (stopped and slow) or lost or seen.stays_put[t]
+        over[t] = surely_static[t] or (stopped and slow) or lost
         still_moves = moving[t] and seems_to_move(shown, seen.advances[t], asked)
         # One fragment alone is no proof, but a reason to keep what more of them showed.
         one_moves = possible and fast and shown.ends.alike >= 2 and shown_across(shown, asked.threshold)

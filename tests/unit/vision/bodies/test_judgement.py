@@ -194,14 +194,6 @@ def test_no_proof_counts_while_the_cameras_own_motion_is_unknown(proof: str) -> 
 
 
 @pytest.mark.parametrize("proof", EVIDENT)
-def test_no_proof_counts_for_a_surface_that_stays_where_it_is(proof: str) -> None:
-    stays = replace(EVIDENT[proof], stays_put=np.array([True]))
-    assert not rises(stays)
-    # What was taken for a mover ends as fast as what surely stands.
-    assert verdict(stays, 1.0, True).evidence[0] == pytest.approx(1.0 - DT_S / 0.12)
-
-
-@pytest.mark.parametrize("proof", EVIDENT)
 def test_no_proof_counts_for_a_wall(proof: str) -> None:
     assert not rises(replace(EVIDENT[proof], size_m=np.array([3.1])))
 

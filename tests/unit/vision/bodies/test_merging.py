@@ -151,5 +151,28 @@ def test_far_end_of_a_vehicle_beside_its_near_side_belongs_to_it() -> None:
     assert merged(VAN, FAR_END, velocity=[(0.29, 0.0, 0.0)] * 2, behind_m=4.0) == []  # as slow as what stands
 
 
+LOAD = Body(-0.8, width=1.0, height=1.2, cells=900)
+CAB = Body(1.1, z=4.2, width=0.8, height=1.5, cells=800)  # 1.0 m from the load
+NEARLY = [(0.8, 0.0, 0.0), (0.8, 0.0, 0.45)]
+
+
+def test_halves_of_a_vehicle_on_both_sides_of_a_pillar_are_one() -> None:
+    """First seen so, nothing but the pillar between them, and their velocities hardly known yet."""
+    assert merged(LOAD, CAB, velocity=NEARLY, behind_m=2.0) == [(1, 0)]
+    assert merged(LOAD, CAB, velocity=NEARLY, behind_m=4.1) == []  # no pillar: their own depth
+    assert merged(LOAD, CAB, velocity=NEARLY, behind_m=0.0) == []
+    assert merged(LOAD, CAB, velocity=NEARLY, behind_m=6.0) == []  # two vehicles
+    assert merged(replace(LOAD, x=-0.7, width=0.8), CAB, velocity=NEARLY, behind_m=2.0) == []  # two people
+    assert merged(LOAD, replace(CAB, x=1.35), velocity=NEARLY, behind_m=2.0) == [(1, 0)]
+    assert merged(LOAD, replace(CAB, x=1.45), velocity=NEARLY, behind_m=2.0) == []  # 1.35 m
+    assert merged(LOAD, replace(CAB, z=4.45), velocity=NEARLY, behind_m=2.0) == []
+    assert merged(LOAD, replace(CAB, y=1.0), velocity=NEARLY, behind_m=2.0) == []  # hardly beside it
+    towards = [(0.4, 0.0, 0.0), (0.3, 0.0, -0.3)]  # 0.32 m/s, of somebody who goes 0.42
+    assert merged(LOAD, CAB, velocity=towards, sigma=0.2, behind_m=2.0) == []
+    faster = [(1.2, 0.0, 0.0), (1.2, 0.0, 0.65)]
+    assert merged(LOAD, CAB, velocity=faster, sigma=0.2, behind_m=2.0) == []
+    assert merged(LOAD, CAB, velocity=[(0.8, 0.0, 0.0), (0.25, 0.0, 0.0)], sigma=0.2, behind_m=2.0) == []
+
+
 def test_tracks_that_are_not_seen_take_no_part() -> None:
     assert merged(PERSON, Body(0.45, y=-0.3, width=0.3, height=0.3, cells=0)) == []
