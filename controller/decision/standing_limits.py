@@ -18,6 +18,7 @@ from controller.decision.bodies import Bodies
 from controller.decision.corridor import BEYOND_RANGE_M, Corridor, Placed, place
 from controller.decision.limits import (
     ALONGSIDE_M,
+    STANDING_MPS,
     Gap,
     Limit,
     Motion,
@@ -34,8 +35,9 @@ from hal.types import CameraMount, FloatArray
 # Beside the robot (its front is past the near side) only a body this far inside the corridor counts.
 _INSIDE_BODY_M = 0.05
 # Hysteresis is against measurements that change, so it ends: what has been clear of the lateral margin for so
-# long stays clear.
+# long stays clear. While the robot drives, what has not been seen for _UNMEASURED_S does not count as clear.
 _CLEAR_FOR_S = 2.0
+_UNMEASURED_S = 0.3
 # Outlines are kept of bodies this far beside the lateral margin: later, when only a part is in view, the box
 # of such a body may reach into the corridor.
 _BESIDE_M = 0.5
@@ -90,7 +92,7 @@ class StandingLimits:
             if near.block_to_s_m <= s_m:
                 continue
             track_id, gap_m = near.track_id, near.block_from_s_m - s_m
-            self._note_clear(near, now_s)
+            self._note_clear(near, motion.v_mps, now_s)
             if self._has_long_been_clear(track_id, now_s):
                 self._inside.discard(track_id)
             beside_m = margins.lateral_m + (margins.graze_m if track_id in self._inside else 0.0)
@@ -110,12 +112,13 @@ class StandingLimits:
             )
         return found
 
-    def _note_clear(self, near: _Near, now_s: float) -> None:
+    def _note_clear(self, near: _Near, v_mps: float, now_s: float) -> None:
         """Note since when a body has been clear of the lateral margin."""
-        if near.clearance_m <= self._config.margins.lateral_m:
-            self._clear_since_s.pop(near.track_id, None)
-        else:
+        known = v_mps <= STANDING_MPS or near.unseen_s <= _UNMEASURED_S
+        if known and near.clearance_m > self._config.margins.lateral_m:
             self._clear_since_s.setdefault(near.track_id, now_s)
+        else:
+            self._clear_since_s.pop(near.track_id, None)
 
     def _has_long_been_clear(self, track_id: int, now_s: float) -> bool:
         return now_s - self._clear_since_s.get(track_id, math.inf) >= _CLEAR_FOR_S

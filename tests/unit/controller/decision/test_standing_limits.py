@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -38,11 +39,16 @@ def test_bodies_count_from_a_clearance_up_to_another_and_only_if_they_stand() ->
     assert _stands_within(moving, clearance_m, -math.inf, 0.3).nonzero()[0].tolist() == [0, 1, 2, 3]
 
 
-def decided_after(seconds: float, v_mps: float, then_clear_m: float) -> Decision:
-    """Something beside the way is measured inside the lateral margin, then at another clearance."""
+def decided_after(seconds: float, v_mps: float, then_clear_m: float, unseen_s: float = 0.0) -> Decision:
+    """Something beside the way is measured inside the lateral margin, then at another clearance.
+
+    unseen_s: since it was seen, in the frames of the second clearance.
+    """
     bench = Bench()
     for clear_m, time_s in ((0.12, 0.5), (then_clear_m, seconds)):
         beside = obstacle(1.6, 0.39 + clear_m + 0.25)
+        if clear_m == then_clear_m:
+            beside = replace(beside, unseen_s=unseen_s)
         for _ in range(round(time_s / 0.02)):
             decision = bench.step(bench.scene(beside), v_mps)
     return decision
@@ -64,3 +70,12 @@ def test_what_stays_clear_of_the_margin_for_two_seconds_is_no_longer_in_the_way(
 ) -> None:
     decision = decided_after(seconds, v_mps, then_clear_m)
     assert (decision.reason.rule == "static") == waits
+
+
+@pytest.mark.parametrize(
+    ("v_mps", "unseen_s", "waits"), [(0.3, 0.2, False), (0.3, 0.4, True), (0.0, 0.4, False)]
+)
+def test_while_the_robot_drives_only_what_is_seen_counts_as_clear(
+    v_mps: float, unseen_s: float, waits: bool
+) -> None:
+    assert (decided_after(2.8, v_mps, 0.17, unseen_s).reason.rule == "static") == waits
