@@ -12,16 +12,13 @@ import math
 import numpy as np
 
 from controller.decision.bodies import Bodies, extended_towards
-from controller.decision.view_edges import ViewEdges, ahead_and_left
+from controller.decision.view_edges import ViewEdges, ahead_and_left, reaches_side_edge
 from hal.compiled import compiled
 from hal.directions import along_and_left
 from hal.types import CameraMount, FloatArray, PlanarPose
 
 # How much nearer it may extend: about the width of a vehicle in a hall.
 _HIDDEN_M = 1.0
-# A corner farther inside the edge of the view than this is seen: a distance, and a share of the view's half
-# width, because depth is often missing in the outermost columns.
-_INSIDE_M, _INSIDE_SHARE = 0.1, 0.1
 # It does not extend nearer to the robot's front than this: more than the robot drives between exposure and
 # decision, plus ALONGSIDE_M (controller/decision/limits.py). Else it would count as something that the front
 # has passed, and the robot would stop braking for it.
@@ -58,7 +55,7 @@ def _hidden(
         vx, vy = bodies.velocity_mps[k]
         along_mps, leftward_mps = along_and_left(vx, vy, cos, sin)
         inwards_mps = -math.copysign(1.0, left_m) * leftward_mps
-        on_edge = inner_m >= (1.0 - _INSIDE_SHARE) * edges.edge_tan * near_m - _INSIDE_M
+        on_edge = reaches_side_edge(inner_m, near_m, edges)
         comes_in = inwards_mps > max(abs(along_mps), _MIN_INWARDS_MPS)
         if bodies.moving[k] and near_m > least_m and on_edge and comes_in:
             hidden_m[k] = min(_HIDDEN_M, near_m - least_m)

@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 
 from controller.decision.bodies import Bodies, extended_towards
 from controller.decision.cut_movers import LEAST_AHEAD_M
+from controller.decision.view_edges import ViewEdges, ahead_and_left, reaches_side_edge
 from hal.clocks import NS_PER_S
 from hal.compiled import compiled, inlined
 from hal.records import record
-from hal.types import FloatArray, Integers, Matrix, PlanarPose, Vector
+from hal.types import CameraMount, FloatArray, Integers, Matrix, PlanarPose, Vector
 
 # Of half its length, as seen from the side. A rectangle turns within the circle through its corners: one of
 # 2.4 x 1.15 m comes nearer by 0.63 of half its length, one of 4.3 x 1.8 m by 0.66.
@@ -27,6 +28,10 @@ _SWING_SHARE = 0.63
 # Half the length of the shortest vehicle that counts. One of 1.2 x 0.8 m comes nearer by 0.32 m, less than
 # the robot keeps free. Two people side by side are as wide as that.
 _LEAST_HALF_M = 0.65
+# Of a vehicle that a side edge of the view cuts, half may be seen: half its length is the width that is seen,
+# but not more than that of a vehicle in a hall. What is narrower than the first of these is a person. What is
+# wider by the last than it ever was while both of its ends were seen, is larger than that.
+_CUT_LEAST_HALF_M, _CUT_HALF_M, _WIDER_M = 0.4, 1.2, 0.1
 # A faster one goes where it is seen to go, and has to slow down before it turns on the spot.
 _SLOW_MPS = 0.6
 _FOR_SURE_NS = NS_PER_S  # something static that is taken for a mover is so for some frames only
@@ -42,15 +47,19 @@ class _Known:
     xy_m: (N, 2) where it was last seen.
     set_off_ns: since when it has been moving; the time of the scene while it stands.
     moved_ns: when it was last in a motion that had lasted for some time.
-    half_m, wide_ns: its greatest half width lately, and when that was seen.
+    seen_half_m, wide_ns: its greatest half width lately, and when that was seen.
+    whole_half_m: the greatest with which it was ever seen inside the view; 0: never.
+    half_m: half its length: seen_half_m, or more where the view cuts it.
     """
 
     ids: Integers
     xy_m: Matrix
     set_off_ns: Integers
     moved_ns: Integers
-    half_m: Vector
+    seen_half_m: Vector
     wide_ns: Integers
+    whole_half_m: Vector
+    half_m: Vector
 
     def followed_by(self, other: _Known, rows: Integers) -> _Known:
         """These tracks, followed by the rows of others."""
@@ -72,14 +81,16 @@ class TurningVehicles:
     def __init__(self, swing_allowed_m: float) -> None:
         self._swing_allowed_m = swing_allowed_m
         nobody = np.zeros(0, np.int64)
-        self._known = _Known(nobody, np.zeros((0, 2)), nobody, nobody, np.zeros(0), nobody)
+        size_m = np.zeros(0)
+        self._known = _Known(nobody, np.zeros((0, 2)), nobody, nobody, size_m, nobody, size_m, size_m)
 
-    def swing_m(self, seen: Bodies) -> FloatArray:
+    def swing_m(self, seen: Bodies, pose: PlanarPose, mount: CameraMount, edges: ViewEdges) -> FloatArray:
         """(N,) by how much more than the margin allows the ends of the tracks of a scene may come nearer.
 
-        0 for whatever is no vehicle that has moved lately and is slow now.
+        0 for whatever is no vehicle that has moved lately and is slow now. pose: of the robot, at the scene.
         """
-        known = _Known(seen.ids, seen.xy_m, *_updated(self._known, seen))
+        cut = _cut_by_view(seen, pose, mount, edges)
+        known = _Known(seen.ids, seen.xy_m, *_updated(self._known, seen, cut))
         swing_m = _swings(known, seen, self._swing_allowed_m)
         self._known = known.followed_by(self._known, _lost(self._known, seen).nonzero()[0])
         return swing_m
@@ -122,6 +133,16 @@ def _row_around(known: _Known, xy_m: FloatArray, now_ns: int) -> int:
     return -1
 
 
+@compiled(Bodies, PlanarPose, CameraMount, ViewEdges)
+def _cut_by_view(seen: Bodies, pose: PlanarPose, mount: CameraMount, edges: ViewEdges) -> NDArray[np.bool_]:
+    """(N,) which tracks may go on beyond a side edge of the view."""
+    cut = np.empty(len(seen.ids), np.bool_)
+    for k in range(len(cut)):
+        ahead_m, left_m = ahead_and_left(seen.xy_m[k], pose, mount)
+        cut[k] = reaches_side_edge(abs(left_m) + seen.half_across_m[k], ahead_m, edges)
+    return cut
+
+
 @compiled(_Known, Bodies)
 def _lost(known: _Known, seen: Bodies) -> NDArray[np.bool_]:
     """(N,) which of the known are vehicles that may turn, and are not seen."""
@@ -131,13 +152,17 @@ def _lost(known: _Known, seen: Bodies) -> NDArray[np.bool_]:
     return lost
 
 
-@compiled(_Known, Bodies)
-def _updated(known: _Known, seen: Bodies) -> tuple[Integers, Integers, FloatArray, Integers]:
-    """set_off_ns, moved_ns, half_m and wide_ns of the tracks seen."""
+@compiled(_Known, Bodies, "boolean[:]")
+def _updated(
+    known: _Known, seen: Bodies, cut: NDArray[np.bool_]
+) -> tuple[Integers, Integers, FloatArray, Integers, FloatArray, FloatArray]:
+    """The fields of _Known from set_off_ns on, of the tracks seen; the view cuts some (N,) of them."""
     now_ns, count = seen.captured_ns, len(seen.ids)
     set_off_ns, moved_ns = np.full(count, now_ns, np.int64), np.full(count, _NEVER_NS, np.int64)
-    half_m, wide_ns = seen.half_across_m.copy(), np.full(count, now_ns, np.int64)
+    seen_half_m, wide_ns = seen.half_across_m.copy(), np.full(count, now_ns, np.int64)
+    whole_half_m, half_m = np.zeros(count), np.empty(count)
     for k in range(count):
+        guess_m = 0.0
         before = _row_of(known.ids, seen.ids[k])
         if before < 0:
             before = _row_around(known, seen.xy_m[k], now_ns)
@@ -145,11 +170,21 @@ def _updated(known: _Known, seen: Bodies) -> tuple[Integers, Integers, FloatArra
             moved_ns[k] = known.moved_ns[before]
             if seen.moving[k]:
                 set_off_ns[k] = known.set_off_ns[before]
-            if half_m[k] < known.half_m[before] and now_ns - known.wide_ns[before] <= _WIDTH_KEPT_NS:
-                half_m[k], wide_ns[k] = known.half_m[before], known.wide_ns[before]
+            if (
+                seen_half_m[k] < known.seen_half_m[before]
+                and now_ns - known.wide_ns[before] <= _WIDTH_KEPT_NS
+            ):
+                seen_half_m[k], wide_ns[k] = known.seen_half_m[before], known.wide_ns[before]
+            whole_half_m[k] = known.whole_half_m[before]
+            guess_m = known.half_m[before] if known.half_m[before] > known.seen_half_m[before] else 0.0
         if now_ns - set_off_ns[k] >= _FOR_SURE_NS:
             moved_ns[k] = now_ns
-    return set_off_ns, moved_ns, half_m, wide_ns
+        if not cut[k]:
+            whole_half_m[k], guess_m = max(whole_half_m[k], seen.half_across_m[k]), 0.0
+        elif seen.half_across_m[k] > max(_CUT_LEAST_HALF_M, whole_half_m[k] + _WIDER_M):
+            guess_m = max(guess_m, min(2.0 * seen.half_across_m[k], _CUT_HALF_M))
+        half_m[k] = max(seen_half_m[k], guess_m)
+    return set_off_ns, moved_ns, seen_half_m, wide_ns, whole_half_m, half_m
 
 
 @compiled(_Known, Bodies, "float64")

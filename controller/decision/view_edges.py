@@ -3,7 +3,7 @@
 The lower edge falls from the camera's height to the floor at near_m ahead; the upper edge rises with the
 slope up_tan from the camera's height; the side edges are at the tangent edge_tan. Heights are over the floor,
 distances ahead of the camera or to its left (ahead_and_left). controller/decision/out_of_view.py,
-unseen_position.py, seen_through.py, cut_movers.py, standing_limits.py and sight.py ask.
+unseen_position.py, seen_through.py, cut_movers.py, turning_vehicles.py, standing_limits.py and sight.py ask.
 """
 
 from __future__ import annotations
@@ -21,6 +21,9 @@ from hal.types import CameraMount, FloatArray, PlanarPose
 
 BoolArray = NDArray[np.bool_]
 
+# What is farther inside a side edge of the view than this is seen: a distance, and a share of the view's half
+# width, because depth is often missing in the outermost columns.
+_INSIDE_M, _INSIDE_SHARE = 0.1, 0.1
 # Uncertainty of the height of a body that is seen only in part.
 UNCERTAIN_M = 0.1
 MIN_TAN, _MIN_M = 0.1, 1e-3  # lower bounds of divisors
@@ -77,6 +80,12 @@ def all_ahead_and_left(points_m: FloatArray, pose: PlanarPose, mount: CameraMoun
     for k in range(len(points_m)):
         places[0, k], places[1, k] = ahead_and_left(points_m[k], pose, mount)
     return places
+
+
+@inlined
+def reaches_side_edge(side_m: float, ahead_m: float, edges: ViewEdges) -> bool:
+    """Whether what ends side_m beside the camera's axis, ahead_m ahead of it, may go on beyond the view."""
+    return side_m >= (1.0 - _INSIDE_SHARE) * edges.edge_tan * ahead_m - _INSIDE_M
 
 
 @inlined

@@ -178,9 +178,9 @@ class WorldModel:
         except SceneError as error:
             return str(error)
         free, s_m = scene.free_space, self.corridor.path.project(pose, on_path.s_m).s_m
-        swing_m = self._turning.swing_m(seen)
-        boxed = _boxed(seen.half_view_m, seen.half_across_m, seen.moving) | (swing_m > 0.0)
         self.edges = edges = self._edges_of(free)
+        swing_m = self._turning.swing_m(seen, pose, self._mount, edges)
+        boxed = _boxed(seen.half_view_m, seen.half_across_m, seen.moving) | (swing_m > 0.0)
         self.surfaces = surfaces = surfaces_of(free, pose, self._mount, self._noise)
         boxes = self._known_places.without_newcomers(seen.select(boxed), seen.ids)
         boxes = self._velocity_filter.update(boxes)

@@ -10,21 +10,30 @@ import pytest
 
 from controller.decision.bodies import Bodies, no_bodies
 from controller.decision.turning_vehicles import TurningVehicles, with_swinging_ends
+from controller.decision.view_edges import ViewEdges
 from hal.clocks import NS_PER_S
 from hal.types import PlanarPose
+from tests.support.decision_bench import MOUNT
 from tests.support.floor_bodies import box
 
 ALLOWED_M, FRONT_M = 0.25, 0.6
+AT_START, EDGES = PlanarPose(0.0, 0.0, 0.0), ViewEdges(edge_tan=0.69, near_m=0.5, up_tan=0.4)
 HALF_LENGTH_M = 1.2  # a fork lift, as seen from the side
 SWING_M = 0.63 * HALF_LENGTH_M - ALLOWED_M
 
 
-def seen(now_s: float, mps: float = 0.0, half_across_m: float = HALF_LENGTH_M, track_id: int = 1) -> Bodies:
+def seen(
+    now_s: float,
+    mps: float = 0.0,
+    half_across_m: float = HALF_LENGTH_M,
+    track_id: int = 1,
+    left_m: float = 0.0,
+) -> Bodies:
     """A vehicle across the way, 4 m ahead, that drives at mps."""
     captured_ns = round(now_s * NS_PER_S)
     return box(
         4.0,
-        0.0,
+        left_m,
         0.0,
         mps,
         number=track_id,
@@ -34,9 +43,14 @@ def seen(now_s: float, mps: float = 0.0, half_across_m: float = HALF_LENGTH_M, t
     )
 
 
+def swing_m(vehicles: TurningVehicles, scene: Bodies) -> list[float]:
+    swings: list[float] = vehicles.swing_m(scene, AT_START, MOUNT, EDGES).tolist()
+    return swings
+
+
 def swing_after(*scenes: Bodies) -> float:
     vehicles = TurningVehicles(ALLOWED_M)
-    return [float(vehicles.swing_m(scene)[0]) for scene in scenes][-1]
+    return [swing_m(vehicles, scene)[0] for scene in scenes][-1]
 
 
 def test_a_vehicle_that_has_just_stopped_may_swing_beyond_the_margin() -> None:
@@ -93,6 +107,41 @@ def test_its_length_is_remembered_while_it_turns_end_on() -> None:
     assert swing_after(*turning, seen(4.4, 0.0, 0.8)) == pytest.approx(0.63 * 0.8 - ALLOWED_M)
 
 
+AHEAD_M = 4.0 - MOUNT.forward_m
+
+
+def at_edge(now_s: float, mps: float = 0.0, half_across_m: float = 0.55, side: int = 1) -> Bodies:
+    """What is seen of a vehicle that a side edge of the view cuts."""
+    return seen(now_s, mps, half_across_m, left_m=side * (EDGES.edge_tan * AHEAD_M - half_across_m))
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+@pytest.mark.parametrize(
+    ("half_across_m", "half_length_m"), [(0.39, 0.0), (0.41, 0.82), (0.55, 1.1), (0.7, 1.2), (1.5, 1.5)]
+)
+def test_of_one_that_the_edge_of_the_view_cuts_half_may_be_seen(
+    half_across_m: float, half_length_m: float, side: int
+) -> None:
+    """As long as a vehicle in a hall, unless more of it is seen; less than 0.8 m of it is a person."""
+    scenes = (at_edge(t, mps, half_across_m, side) for t, mps in ((0.0, 1.0), (1.0, 1.0), (1.1, 0.0)))
+    expected_m = max(0.63 * half_length_m - ALLOWED_M, 0.0)
+    assert swing_after(*scenes) == pytest.approx(expected_m)
+
+
+def test_its_length_is_a_guess_until_both_ends_are_seen() -> None:
+    driven = at_edge(0.0, 1.0), at_edge(1.0, 1.0)
+    assert swing_after(*driven, at_edge(1.1, 0.0, 0.3)) == pytest.approx(0.63 * 1.1 - ALLOWED_M)
+    assert swing_after(*driven, at_edge(1.1), seen(1.2, 0.0, 0.6)) == 0.0
+    assert swing_after(*driven, at_edge(1.1), seen(1.2, 0.0, 0.7)) == pytest.approx(0.63 * 0.7 - ALLOWED_M)
+
+
+def test_one_that_leaves_the_view_is_as_long_as_it_was_seen() -> None:
+    """Unless more of it shows at the edge of the view than was seen before, behind something."""
+    driven = seen(0.0, 1.0, 0.5), seen(1.0, 1.0, 0.5)
+    assert swing_after(*driven, at_edge(1.1)) == 0.0
+    assert swing_after(*driven, at_edge(1.1, 0.0, 0.62)) == pytest.approx(0.63 * 1.2 - ALLOWED_M)
+
+
 def test_a_track_that_begins_where_it_was_is_taken_for_it() -> None:
     """Even if nothing was seen of it meanwhile, for as long as it may be turning."""
     driven = seen(0.0, 1.0), seen(1.0, 1.0)
@@ -101,9 +150,9 @@ def test_a_track_that_begins_where_it_was_is_taken_for_it() -> None:
     nothing = [no_bodies(round(now_s * NS_PER_S)) for now_s in (1.5, 2.0)]
     vehicles = TurningVehicles(ALLOWED_M)
     for scene in (*driven, *nothing):
-        vehicles.swing_m(scene)
-    assert float(vehicles.swing_m(half)[0]) == pytest.approx(SWING_M)
-    assert float(vehicles.swing_m(seen(6.1, 0.0, track_id=3))[0]) == 0.0
+        swing_m(vehicles, scene)
+    assert swing_m(vehicles, half)[0] == pytest.approx(SWING_M)
+    assert swing_m(vehicles, seen(6.1, 0.0, track_id=3))[0] == 0.0
 
 
 def test_a_track_that_begins_elsewhere_is_another_thing() -> None:
@@ -135,8 +184,8 @@ def test_only_vehicles_that_may_turn_are_remembered_out_of_sight() -> None:
     vehicles = TurningVehicles(ALLOWED_M)
     person = replace(seen(0.5, 1.0, 0.3, track_id=2), xy_m=np.array([[9.0, 0.0]]))
     for scene in (person, seen(1.0, 1.0), seen(2.0, 1.0)):
-        vehicles.swing_m(scene)
-    vehicles.swing_m(no_bodies(round(2.1 * NS_PER_S)))
+        swing_m(vehicles, scene)
+    swing_m(vehicles, no_bodies(round(2.1 * NS_PER_S)))
     assert vehicles._known.ids.tolist() == [1]
-    vehicles.swing_m(no_bodies(round(7.1 * NS_PER_S)))
+    swing_m(vehicles, no_bodies(round(7.1 * NS_PER_S)))
     assert vehicles._known.ids.tolist() == []
