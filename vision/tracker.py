@@ -3,8 +3,8 @@
 Steps, with their modules: velocities of fragments (least_squares); arrived and stayed surfaces (arrivals);
 cells to tracks (masks, connected, votes, grouping, births); suspects and furniture cut out (carving,
 left_behind, cutting); movers extended to the floor (grounding); bodies joined and divided (regrouping);
-filters (sightings, rim_motion, approach); fragments to tracks (adoption); velocities of bodies
-(least_squares); verdict (judgement); report. Terms: vision/__init__.py.
+filters (sightings, rim_motion, approach); what hangs (hanging); fragments to tracks (adoption); velocities of
+bodies (least_squares); verdict (judgement); report. Terms: vision/__init__.py.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from vision.bodies import (
     cutting,
     grounding,
     grouping,
+    hanging,
     left_behind,
     masks,
     report,
@@ -127,8 +128,7 @@ class Tracker:
             rim_motion.fuse(tracks, rims, detection.dt_s)
             approach.fuse(tracks, nearing, pose.translation_m, detection.dt_s)
         sightings.forget_implausible(tracks, self._config.motion)
-        if tracks.overhead.any():
-            tracks.overhead &= ~births.reaching_down(grid, whole, len(tracks), self._body_height_m)
+        hanging.update(tracks, grid, whole, self._body_height_m, elapsed_s)
         owner = adopt(tracks, detection, whole, owner, noise)
         if detection.dt_s > 0 and len(tracks):
             body = self._fuse_fragments(detection, owner, velocities)

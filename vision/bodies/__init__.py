@@ -21,6 +21,7 @@ Files, in the order in which they come into play within one frame (vision/tracke
 * sightings - the Kalman filters are updated by the centroids of the visible surfaces.
 * rim_motion - the speed of half hidden bodies by their free rims.
 * approach - the speed of such bodies towards the camera by the depth of their surface then and now.
+* hanging - which tracks hang above the robot.
 * adoption - each fragment is assigned to a track.
 * motion_evidence - all evidence of one frame, for the verdict.
 * proof - what one frame proves of each track: moving, standing still or neither.

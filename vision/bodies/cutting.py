@@ -67,7 +67,7 @@ def cut_out(
     position_m = detection.pose.apply(measured.position_m)
     tracks.start(position_m[known:], FIRST_SIGMA_M, max_speed_mps, evidence, detection.captured_ns)
     tracks.border_is_guess[known:] = evidence > 0.0
-    # A piece of a beam hangs as high as the beam. One that reaches down is seen to do so (vision/tracker.py).
+    # A piece of a beam hangs as high as the beam. One that reaches down is seen to do so (hanging.py).
     tracks.overhead[known:] = True
     left = np.array([cut.left_by for cut in cuts if cut.left_by is not None], np.intp)
     tracks.reset_position(left, position_m[left], np.tile(FIRST_SIGMA_M**2 * np.eye(3), (len(left), 1, 1)))

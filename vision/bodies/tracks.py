@@ -62,6 +62,7 @@ class Tracks:
     border_is_guess: Flags = _column(np.bool_)
     merged_away: Flags = _column(np.bool_)  # joined to another track, so it ends with this frame
     overhead: Flags = _column(np.bool_)  # seen only above the robot's height; the rest is out of sight
+    ends_above_s: Vector = _column(float)  # for how long it has been seen to end above the robot
     # The verdict (vision/bodies/judgement.py).
     evidence: Vector = _column(float)  # the score it rests on
     moving: Flags = _column(np.bool_)  # now
