@@ -126,19 +126,19 @@ class Complaints:
 
 @dataclass
 class Standstill:
-    """Since when the robot has been commanded to stand; None while it drives."""
+    """Since when the robot has been commanded to stand; None while it drives or turns."""
 
     since_ns: int | None = None
 
     def add(self, setpoint: Setpoint) -> None:
         """Add the setpoint of one control step."""
-        if setpoint.v_mps > 0.0:
+        if setpoint.v_mps > 0.0 or setpoint.w_radps != 0.0:
             self.since_ns = None
         elif self.since_ns is None:
             self.since_ns = setpoint.stamp_ns
 
     def elapsed_s(self, now_ns: int) -> float:
-        """How long the robot has been commanded to stand; 0 while it drives."""
+        """How long the robot has been commanded to stand; 0 while it drives or turns."""
         return 0.0 if self.since_ns is None else (now_ns - self.since_ns) / NS_PER_S
 
 

@@ -3,8 +3,8 @@
 A track begins as hanging or not (vision/bodies/births.py). It hangs no longer once cells of it are seen below
 the robot's height. It hangs again once nothing of it has been below that height for a while, and what is
 measured next below its lower end is farther away all along it: a sign or a bar over the way is one part with
-the post beside it, or with somebody behind it, for some frames. Below legs that give no depth, the floor before
-them is nearer.
+the post beside it, or with somebody behind it, for some frames. Below legs that give no depth, the floor is
+measured next, and it is as near as they are.
 
 vision/tracker.py calls it once the tracks have their cells. Terms: vision/__init__.py.
 """

@@ -152,6 +152,13 @@ def test_standing_is_counted_from_the_first_zero_on() -> None:
     assert standstill.elapsed_s(11_000 * MS) == 0.0
 
 
+def test_a_robot_that_turns_in_place_does_not_stand() -> None:
+    standstill = Standstill()
+    for seconds, yaw_radps in ((0, 0.0), (5, -0.4), (6, 0.0)):
+        standstill.add(Setpoint(seconds * 1000 * MS, 0.0, 0.0, yaw_radps))
+    assert standstill.elapsed_s(10_000 * MS) == 4.0
+
+
 def test_frames_that_were_not_looked_at_are_told_and_a_camera_that_begins_anew_loses_none() -> None:
     frames = FrameTally()
     for sequence in (7, 8, 9, 0, 1):
