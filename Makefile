@@ -4,6 +4,12 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/pip install --quiet --disable-pip-version-check
 
+define HINT
+treadwatch: the packages of requirements.lock could not be installed, see above. Where one has to be built from source
+(ruckig on arm64), install a C++ compiler and the headers of Python first, on Debian and Ubuntu: apt install g++ python3-dev
+endef
+export HINT
+
 .PHONY: run test check golden bench hil faults campaign-quick clean
 
 run: $(VENV)/ready
@@ -37,7 +43,7 @@ campaign-quick: $(VENV)/ready
 $(VENV)/ready: requirements.lock pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "treadwatch needs Python 3.11 or newer")'
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(PIP) --no-deps -r requirements.lock
+	$(PIP) --no-deps -r requirements.lock || { echo "$$HINT" >&2; exit 1; }
 	$(PIP) --no-deps --no-build-isolation --editable .
 	$(BIN)/python -c 'import controller.build, controller.campaign.command'
 	touch $@
