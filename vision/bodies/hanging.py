@@ -49,16 +49,16 @@ def _ends_above(
     In nearly all columns. jump: 1/m; less is the same surface.
     """
     rows, columns = labels.shape
-    lowest, ends, column_of = np.zeros(count), np.zeros(count), np.full(count, -1, np.intp)
-    for j in range(columns):
-        for i in range(rows - 1, -1, -1):
+    lowest, ends = np.zeros(count), np.zeros(count)
+    seen = np.zeros((count, columns), np.bool_)
+    below = np.full(columns, np.float32(np.inf))  # inverse depth of what is measured next below; inf: nothing
+    for i in range(rows - 1, -1, -1):
+        for j in range(columns):
             t = labels[i, j] - 1
-            if t < 0 or column_of[t] == j:
-                continue
-            column_of[t] = j
-            lowest[t] += 1
-            for k in range(i + 1, rows):
-                if beyond[k, j] or inverse[k, j] > 0.0:
-                    ends[t] += inverse[k, j] < inverse[i, j] - jump
-                    break
+            if t >= 0 and not seen[t, j]:
+                seen[t, j] = True
+                lowest[t] += 1
+                ends[t] += below[j] < inverse[i, j] - jump
+            if beyond[i, j] or inverse[i, j] > 0.0:
+                below[j] = inverse[i, j]
     return (lowest > 0) & (ends >= _ENDS_SHARE * lowest)
