@@ -128,7 +128,7 @@ class Tracker:
             rim_motion.fuse(tracks, rims, detection.dt_s)
             approach.fuse(tracks, nearing, pose.translation_m, detection.dt_s)
         sightings.forget_implausible(tracks, self._config.motion)
-        hanging.update(tracks, grid, whole, self._body_height_m, elapsed_s)
+        hanging.update(tracks, grid, whole, measured, self._body_height_m, elapsed_s)
         owner = adopt(tracks, detection, whole, owner, noise)
         if detection.dt_s > 0 and len(tracks):
             body = self._fuse_fragments(detection, owner, velocities)

@@ -19,46 +19,61 @@ from vision.bodies.births import reaching_down
 from vision.bodies.tracks import Tracks
 from vision.depth.connected import MAX_JUMP, IntGrid
 from vision.depth.depth_grid import BoolGrid, DepthGrid, FloatGrid
+from vision.depth.regions import Regions
 
 _ENDS_SHARE = 0.8  # of the columns; two legs take up more than the rest of the lower end of a coat
 _FOR_S = 1.0  # as long as three steps, in which a leg behind the other one comes into view
 
 
-def update(tracks: Tracks, grid: DepthGrid, labels: IntGrid, body_height_m: float, dt_s: float) -> None:
+def update(
+    tracks: Tracks, grid: DepthGrid, labels: IntGrid, measured: Regions, body_height_m: float, dt_s: float
+) -> None:
     """Update tracks.overhead by the cells labels (h, w), track index + 1, of a frame dt_s after the last one.
 
-    body_height_m: the robot's. Without a known floor nothing hangs.
+    measured: the regions of the tracks. body_height_m: the robot's. Without a known floor nothing hangs.
     """
     low = reaching_down(grid, labels, len(tracks), body_height_m)
     tracks.overhead &= ~low
-    standing = ~(low | tracks.overhead | tracks.mover)
-    if not np.count_nonzero(standing):
+    asked = (measured.cells > 0) & ~(low | tracks.overhead | tracks.mover)
+    if not np.count_nonzero(asked):
         tracks.ends_above_s[:] = 0.0
         return
-    ends = standing & _ends_above(grid.inverse_depth, grid.beyond, labels, len(tracks), np.float32(MAX_JUMP))
+    boxes = (measured.bbox_px / grid.step_px).astype(np.intp)
+    ends = _ends_above(grid.inverse_depth, grid.beyond, labels, asked, boxes, np.float32(MAX_JUMP))
     tracks.ends_above_s = np.where(ends, tracks.ends_above_s + dt_s, 0.0)
     tracks.overhead |= tracks.ends_above_s >= _FOR_S
 
 
-@compiled("float32[:, ::1], boolean[:, ::1], int32[:, ::1], int64, float32")
+@compiled("float32[:, ::1], boolean[:, ::1], int32[:, ::1], boolean[::1], int64[:, ::1], float32")
 def _ends_above(
-    inverse: FloatGrid, beyond: BoolGrid, labels: IntGrid, count: int, jump: np.float32
+    inverse: FloatGrid,
+    beyond: BoolGrid,
+    labels: IntGrid,
+    asked: NDArray[np.bool_],
+    boxes: NDArray[np.intp],
+    jump: np.float32,
 ) -> NDArray[np.bool_]:
-    """(count,) below the lowest cells of which tracks something farther is measured first.
+    """(T,) below the lowest cells of which of the tracks asked for (T,) something farther is measured first.
 
-    In nearly all columns. jump: 1/m; less is the same surface.
+    In nearly all columns. boxes (T, 4): first column and row, last column and row or more. jump: 1/m; less is
+    the same surface.
     """
     rows, columns = labels.shape
-    lowest, ends = np.zeros(count), np.zeros(count)
-    seen = np.zeros((count, columns), np.bool_)
-    below = np.full(columns, np.float32(np.inf))  # inverse depth of what is measured next below; inf: nothing
-    for i in range(rows - 1, -1, -1):
-        for j in range(columns):
-            t = labels[i, j] - 1
-            if t >= 0 and not seen[t, j]:
-                seen[t, j] = True
-                lowest[t] += 1
-                ends[t] += below[j] < inverse[i, j] - jump
-            if beyond[i, j] or inverse[i, j] > 0.0:
-                below[j] = inverse[i, j]
-    return (lowest > 0) & (ends >= _ENDS_SHARE * lowest)
+    ends = np.zeros(len(asked), np.bool_)
+    for t in range(len(asked)):
+        if not asked[t]:
+            continue
+        lowest, ending = 0, 0
+        for j in range(max(boxes[t, 0], 0), min(boxes[t, 2] + 1, columns)):
+            i = min(boxes[t, 3], rows - 1)
+            while i >= 0 and labels[i, j] != t + 1:
+                i -= 1
+            if i < 0:
+                continue
+            lowest += 1
+            k = i + 1
+            while k < rows and not (beyond[k, j] or inverse[k, j] > 0.0):
+                k += 1
+            ending += int(k < rows and inverse[k, j] < inverse[i, j] - jump)
+        ends[t] = lowest > 0 and ending >= _ENDS_SHARE * lowest
+    return ends

@@ -9,6 +9,7 @@ from hal.types import FloatArray
 from tests.support.grids import LEVEL_UP, grid_of, labelled, nearest, plane, plate, wall
 from vision.bodies import hanging
 from vision.bodies.tracks import Tracks
+from vision.depth.regions import measure
 
 ROBOT_M, CAMERA_M, DT_S = 0.5, 0.6, 0.1
 # A bar 3 m ahead, 0.84 to 0.96 m over the floor, on a post at its left end.
@@ -24,7 +25,7 @@ def seen_for(frames: int, depth_m: FloatArray, body_m: FloatArray, tracks: Track
         tracks.start(np.array([[0.0, 0.0, 3.0]]), 0.2, 1.5, 0.0, 0)
     grid, labels = grid_of(depth_m, LEVEL_UP, CAMERA_M), labelled((body_m > 0.0) & (depth_m == body_m))
     for _ in range(frames):
-        hanging.update(tracks, grid, labels, ROBOT_M, DT_S)
+        hanging.update(tracks, grid, labels, measure(grid, labels, 1), ROBOT_M, DT_S)
     return tracks
 
 
@@ -90,5 +91,6 @@ def test_what_moves_or_may_move_has_legs() -> None:
 
 def test_without_a_known_floor_nothing_hangs() -> None:
     tracks, depth_m = seen_for(11, nearest(BAR, FLOOR), BAR), nearest(BAR, FLOOR)
-    hanging.update(tracks, grid_of(depth_m), labelled(depth_m == BAR), ROBOT_M, DT_S)
+    grid, labels = grid_of(depth_m), labelled(depth_m == BAR)
+    hanging.update(tracks, grid, labels, measure(grid, labels, 1), ROBOT_M, DT_S)
     assert not tracks.overhead[0]
