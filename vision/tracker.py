@@ -45,7 +45,7 @@ from vision.depth.free_space import free_space
 from vision.depth.near_floor import NearFloor
 from vision.depth.regions import Regions
 from vision.detection import Detection
-from vision.motion import least_squares, limbs
+from vision.motion import least_squares, limbs, sliding
 from vision.motion.least_squares import BodyVelocities, FragmentVelocities
 from vision.percept import Percept
 from vision.scene import CameraCondition, FreeSpace, Scene
@@ -131,7 +131,7 @@ class Tracker:
         hanging.update(tracks, grid, whole, measured, self._body_height_m, elapsed_s)
         owner = adopt(tracks, detection, whole, owner, noise)
         if detection.dt_s > 0 and len(tracks):
-            body = self._fuse_fragments(detection, owner, velocities)
+            body = self._fuse_fragments(detection, owner, velocities, ~visible.sides_visible)
             arrivals = masks.count_cells(whole, changes.arrived_cells, len(tracks))
             measures = FrameMeasures(body, rims, nearing, arrivals, measured.cells, keeps_area)
             self._judge(detection, measures)
@@ -199,9 +199,16 @@ class Tracker:
         return votes.divide(parts, predicted, ballot, winner)
 
     def _fuse_fragments(
-        self, detection: Detection, owner: NDArray[np.int64], velocities: FragmentVelocities
+        self,
+        detection: Detection,
+        owner: NDArray[np.int64],
+        velocities: FragmentVelocities,
+        cut: NDArray[np.bool_],
     ) -> BodyVelocities:
-        """One weighted least squares per body, fused into its filter. owner (N,): track of each fragment."""
+        """One weighted least squares per body, fused into its filter.
+
+        owner (N,): track of each fragment. cut (T,): tracks of which a part is hidden or beside the view.
+        """
         tracks, max_mps = self._tracks, self._config.motion.max_speed_mps
         rotation = detection.pose.rotation
         index = tracks.index_of(owner)
@@ -227,6 +234,8 @@ class Tracker:
                 lag_s / detection.dt_s,
                 rotation,
             )
+            sight, _ = tracks.sight(detection.pose.translation_m)
+            noise += sliding.variance(body, cut, use, sight)
             tracks.update_with_fragments(use, velocity, noise)
         return body
 

@@ -12,5 +12,6 @@ In track (vision/tracker.py):
 * least_squares - velocities of fragments and of bodies from these equations.
 * moving_fragments - which fragments move, which are static, and which move alike.
 * limbs - when to believe fragments of a body that disagree.
+* sliding - when few fragments of a body tell nothing of its motion along the line of sight.
 * line_of_sight - velocities along and across the line of sight, in their own sigmas.
 """

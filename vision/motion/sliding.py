@@ -1,0 +1,36 @@
+"""Ends that slide along their own edge: the speed along the line of sight that few fragments cannot tell.
+
+Along the line of sight, fragments measure by their length. Where an edge ends at something behind the body, such
+as a seam of the ceiling behind the corner of a lorry, that end is no point of the body: as the body moves, it
+slides along the edge, and the length changes as if the body came nearer or went away. Many fragments, or the
+centre of a surface that is seen from side to side, outvote it. vision/tracker.py asks for the bodies where
+neither is there.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hal.types import FloatArray
+from vision.motion.least_squares import BodyVelocities
+
+_MANY_ENDS = (
+    8  # four fragments; as for a proof of motion along the line of sight (vision/bodies/proof_rules.py)
+)
+_SLIDING_MPS = 3.0  # an end slides about as fast as its body and the robot move
+
+
+def variance(
+    body: BodyVelocities, cut: NDArray[np.bool_], use: NDArray[np.intp], sight: FloatArray
+) -> FloatArray:
+    """(K, 3, 3) additional covariance (m^2/s^2) of the velocities by fragments of the tracks use (K,).
+
+    cut (T,): tracks of which a part is hidden or beside the view. sight (T, 3): unit vectors to them.
+    """
+    unsure = cut[use] & (body.agreement[use] * body.ends[use] < _MANY_ENDS)
+    along = sight[use]
+    result: FloatArray = np.where(unsure, _SLIDING_MPS**2, 0.0)[:, None, None] * (
+        along[:, :, None] * along[:, None, :]
+    )
+    return result
