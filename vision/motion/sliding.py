@@ -1,10 +1,10 @@
 """Ends that slide along their own edge: the speed along the line of sight that few fragments cannot tell.
 
 Along the line of sight, fragments measure by their length. Where an edge ends at something behind the body,
-such as a seam of the ceiling behind the corner of a lorry, that end is no point of the body. As the body moves,
-it slides along the edge, and the length changes as if the body came nearer or went away. Many fragments outvote
-it, and so does the centre of a surface that is seen from side to side. vision/tracker.py asks for the bodies
-where neither is there.
+such as a seam of the ceiling behind the corner of a lorry, that end is no point of the body. As the body
+moves, it slides along the edge, and the length changes as if the body came nearer or went away. Many
+fragments outvote it, and so does the centre of a surface that is seen from side to side. vision/tracker.py
+asks for the bodies where neither is there.
 """
 
 from __future__ import annotations
