@@ -131,7 +131,7 @@ class Tracker:
         hanging.update(tracks, grid, whole, measured, self._body_height_m, elapsed_s)
         owner = adopt(tracks, detection, whole, owner, noise)
         if detection.dt_s > 0 and len(tracks):
-            body = self._fuse_fragments(detection, owner, velocities, ~visible.sides_visible)
+            body = self._fuse_fragments(detection, owner, velocities, ~measured.sides_visible)
             arrivals = masks.count_cells(whole, changes.arrived_cells, len(tracks))
             measures = FrameMeasures(body, rims, nearing, arrivals, measured.cells, keeps_area)
             self._judge(detection, measures)
@@ -207,7 +207,7 @@ class Tracker:
     ) -> BodyVelocities:
         """One weighted least squares per body, fused into its filter.
 
-        owner (N,): track of each fragment. cut (T,): tracks of which a part is hidden or beside the view.
+        owner (N,): track of each fragment. cut (T,): tracks that the left or right border of the image cuts.
         """
         tracks, max_mps = self._tracks, self._config.motion.max_speed_mps
         rotation = detection.pose.rotation

@@ -157,14 +157,16 @@ class StandingLimits:
 
         In bends it comes from each body's outline when it was last seen whole, unless a part that is nearer
         to the corridor is seen now; of bodies that never were, from the part that the edge of the view left
-        last. On a straight path the box fits, but mixed pixels at its edges make it
-        some centimetres too wide: there the outline counts only for boxes that do not reach into the corridor
-        itself. before: by id, these outlines up to the last scene.
+        last. On a straight path the box fits, but mixed pixels at its edges make it some centimetres too
+        wide: there the outline counts only for boxes that do not reach into the corridor itself. No outline
+        shows how far the ends of a vehicle may swing, so its box counts. before: by id, these outlines up to
+        the last scene.
         """
         clearance_m = placed.clearance_m[:, 0].copy()
         margins, straight = self._config.margins, known.corridor.straight
         least_m, most_m = (0.0, margins.graze_m) if straight else (-math.inf, _BESIDE_M)
         beside = _stands_within(known.bodies.moving, clearance_m, least_m, margins.lateral_m + most_m)
+        beside &= ~known.may_swing
         if np.count_nonzero(beside):
             beside &= placed.block_to_s_m[:, 0] > s_m
         if not np.count_nonzero(beside):

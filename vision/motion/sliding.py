@@ -26,7 +26,7 @@ def variance(
 ) -> FloatArray:
     """(K, 3, 3) additional covariance (m^2/s^2) of the velocities by fragments of the tracks use (K,).
 
-    cut (T,): tracks of which a part is hidden or beside the view. sight (T, 3): unit vectors to them.
+    cut (T,): tracks that the left or right border of the image cuts. sight (T, 3): unit vectors to them.
     """
     unsure = cut[use] & (body.agreement[use] * body.ends[use] < _MANY_ENDS)
     along = sight[use]

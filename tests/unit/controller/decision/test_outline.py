@@ -253,6 +253,23 @@ def test_body_that_moved_meanwhile_has_to_be_seen_whole_again() -> None:
     assert look(bench, PART, half_blind(seen)).reason.rule == "static"
 
 
+@pytest.mark.parametrize(("drove", "blocks"), [(True, True), (False, False)])
+def test_of_a_vehicle_that_may_turn_the_box_counts(drove: bool, blocks: bool) -> None:
+    """Outside of the bend, seen face on. Once it has driven and stands, its end may swing into the way."""
+    ahead_m, (right_m, left_m), depth_m = 3.4, (-1.2, 0.8), 1.0
+    across_m = -TANGENTS * (ahead_m - MOUNT.forward_m)
+    seen_there = (across_m >= right_m) & (across_m <= left_m)
+    nearest_m = np.where(seen_there, ahead_m - MOUNT.forward_m, math.inf)
+    seen = FreeSpace(TANGENTS, HALF_BAND, nearest_m, np.minimum(nearest_m, 9.0))
+    stands = obstacle(ahead_m + 0.5 * depth_m, 0.5 * (right_m + left_m), size_m=(left_m - right_m, 1.6))
+    stands = replace(stands, extent_m=np.array([left_m - right_m, 1.6, depth_m]))
+    drives = replace(stands, moving=True, velocity_mps=np.array([-1.0, 0.0, 0.0]))
+    bench = Bench()
+    for _ in range(7):
+        look(bench, drives if drove else stands, seen)
+    assert (look(bench, stands, seen).reason.rule == "static") == blocks
+
+
 def test_robot_stops_for_a_part_that_shows_on_the_path_later() -> None:
     """The crate was the end of something longer, which goes on into the way."""
     bench = Bench()

@@ -1,4 +1,4 @@
-"""The speed along the line of sight, by few fragments of a body of which a part is hidden or out of view."""
+"""The speed along the line of sight, by few fragments of a body that the border of the image cuts."""
 
 from __future__ import annotations
 
