@@ -23,9 +23,8 @@ _GAP_BANDS = 2.5
 # Beside a nearer object, a stereo camera measures nothing for up to this many bands.
 _SHADOW_BANDS = 2
 # If the outline begins farther than this behind the near side of the box, it belongs to something else behind
-# the body, and the body itself gives no depth: a distance, and a share of half the depth of the box. The box
-# begins too near where a front and a long flank are seen.
-_BEHIND_M, _BEHIND_SHARE = 0.15, 0.5
+# the body, and the body itself gives no depth.
+_BEHIND_M = 0.15
 
 
 @record(frozen=True, slots=True)
@@ -33,14 +32,11 @@ class Outline:
     """What depth shows of one body.
 
     clearance_m: free floor between the visible part of the body and the corridor; negative: inside it; inf:
-        nothing of it is visible.
-    whole: the body is visible from end to end.
-    cut: it is, but for what the edge of the view cuts off.
+    nothing of it is visible. whole: the body is visible from end to end.
     """
 
     clearance_m: float
     whole: bool
-    cut: bool = False
 
 
 def outline_of(
@@ -56,7 +52,7 @@ def outline_of(
 
     own: (P,) which of the surfaces of the same scene belong to it. stretch_m: the path is searched from the
     first to the second of these. depth_m: least depth of a body, from its nearest point on, since its back is
-    hidden behind what is seen, along the ray of sight.
+    hidden.
     """
     if not own.any():
         return Outline(math.inf, whole=False)
@@ -65,18 +61,15 @@ def outline_of(
     outline, half_band_m = surfaces.points_m[own], surfaces.half_band_m[own]
     offset = outline - bodies.xy_m[k]
     along, across = offset @ ahead, offset @ (-ahead[1], ahead[0])
-    complete, at_edge = _ends(surfaces, own)
-    complete &= _seen_throughout(across, half_band_m, float(bodies.half_across_m[k]))
-    complete &= float(along.min()) <= _BEHIND_M - (1.0 - _BEHIND_SHARE) * float(bodies.half_view_m[k])
-    if complete:
+    whole = _seen_throughout(across, half_band_m, float(bodies.half_across_m[k]))
+    whole &= float(along.min()) <= _BEHIND_M - float(bodies.half_view_m[k]) and _ends_in_view(surfaces, own)
+    if whole:
         hidden_m = max(depth_m - float(np.ptp(along)), 0.0)
-        rays = outline - surfaces.eye_m
-        rays /= np.hypot(rays[:, 0], rays[:, 1])[:, None]
-        outline = np.concatenate((outline, outline + hidden_m * rays))
+        outline = np.concatenate((outline, outline + hidden_m * ahead))
         half_band_m = np.concatenate((half_band_m, half_band_m))
     _, d_m, half_width_m = corridor.locate(outline, *stretch_m)
     clear = np.abs(d_m) - half_band_m - half_width_m
-    return Outline(float(clear.min()), whole=complete and not at_edge, cut=complete and at_edge)
+    return Outline(float(clear.min()), whole)
 
 
 def _seen_throughout(across_m: FloatArray, half_band_m: FloatArray, half_m: float) -> bool:
@@ -85,22 +78,19 @@ def _seen_throughout(across_m: FloatArray, half_band_m: FloatArray, half_m: floa
     return bool(np.diff(edges).max() <= _GAP_BANDS * 2.0 * float(half_band_m.max()))
 
 
-def _ends(surfaces: Surfaces, own: NDArray[np.bool_]) -> tuple[bool, bool]:
-    """Whether the surfaces own (P,) end where they seem to, and whether one of these ends is at the edge of
-    the view.
+def _ends_in_view(surfaces: Surfaces, own: NDArray[np.bool_]) -> bool:
+    """Whether farther things are seen beside both ends of the surfaces own (P,).
 
-    Beside an end in view, something farther is seen. Else the body may go on behind something nearer.
+    Else the body may go on: beyond the edge of the view, where nothing was measured, or behind something
+    nearer.
     """
     bands, forward_m = surfaces.bands[own], surfaces.forward_m[own]
-    left, right = surfaces.seen_m[: bands[0]][::-1], surfaces.seen_m[bands[-1] + 1 :]
-    left_edge, right_edge = not left.any(), not right.any()
-    left_ends = left_edge or _beyond(left, float(forward_m[0]))
-    right_ends = right_edge or _beyond(right, float(forward_m[-1]))
-    return left_ends and right_ends, left_edge or right_edge
+    left = surfaces.seen_m[max(bands[0] - _SHADOW_BANDS, 0) : bands[0]][::-1]
+    right = surfaces.seen_m[bands[-1] + 1 : bands[-1] + 1 + _SHADOW_BANDS]
+    return _beyond(left, float(forward_m[0])) and _beyond(right, float(forward_m[-1]))
 
 
 def _beyond(seen_m: FloatArray, end_m: float) -> bool:
-    """Whether the first measured band of those next to an end, seen_m (B,), is seen farther than end_m."""
-    measured = seen_m[:_SHADOW_BANDS]
-    measured = measured[measured > 0.0]
+    """Whether the first measured band of those beside an end, seen_m (K,), is seen farther than end_m."""
+    measured = seen_m[seen_m > 0.0]
     return bool(len(measured) and measured[0] > end_m)

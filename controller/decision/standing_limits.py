@@ -25,7 +25,7 @@ from controller.decision.limits import (
     standing_text,
     stop_before,
 )
-from controller.decision.outline import Outline, outline_of
+from controller.decision.outline import outline_of
 from controller.decision.view_edges import visible_from_m
 from controller.decision.world_model import WorldModel
 from hal.compiled import compiled
@@ -44,7 +44,6 @@ _BESIDE_M = 0.5
 # Greatest distance at which the robot stands off something that hangs and would rise above the view.
 _MAX_HANGING_STOP_M = 3.0
 _NOW = np.zeros(1)
-_NO_OUTLINE = Outline(-math.inf, whole=False)
 
 
 @record(frozen=True, slots=True)
@@ -80,7 +79,7 @@ class StandingLimits:
         self._taken_from: Bodies | None = None
         self._near: list[_Near] = []
         self._corridor: Corridor | None = None
-        self._outlines: dict[int, Outline] = {}
+        self._outlines_m: dict[int, float] = {}
         self._clear_since_s: dict[int, float] = {}
 
     def limits(self, known: WorldModel, s_m: float, motion: Motion, now_s: float) -> list[Limit]:
@@ -129,9 +128,9 @@ class StandingLimits:
 
         Outlines that were measured along another path are not used.
         """
-        before = self._outlines if known.corridor is self._corridor else {}
+        before = self._outlines_m if known.corridor is self._corridor else {}
         self._taken_from, self._corridor = known.bodies, known.corridor
-        self._near, self._outlines = [], {}
+        self._near, self._outlines_m = [], {}
         bodies = known.bodies
         if np.count_nonzero(bodies.moving) == len(bodies):
             return
@@ -151,22 +150,19 @@ class StandingLimits:
             del self._clear_since_s[gone]
 
     def _clearances(
-        self, known: WorldModel, placed: Placed, s_m: float, before: dict[int, Outline]
+        self, known: WorldModel, placed: Placed, s_m: float, before: dict[int, float]
     ) -> FloatArray:
         """(N,) free floor between the bodies and the corridor; notes the outlines that it measures.
 
         In bends it comes from each body's outline when it was last seen whole, unless a part that is nearer
-        to the corridor is seen now; of bodies that never were, from the part that the edge of the view left
-        last. On a straight path the box fits, but mixed pixels at its edges make it some centimetres too
-        wide: there the outline counts only for boxes that do not reach into the corridor itself. No outline
-        shows how far the ends of a vehicle may swing, so its box counts. before: by id, these outlines up to
-        the last scene.
+        to the corridor is seen now. On a straight path the box fits, but mixed pixels at its edges make it
+        some centimetres too wide: there the outline counts only for boxes that do not reach into the corridor
+        itself. before: by id, these clearances up to the last scene.
         """
         clearance_m = placed.clearance_m[:, 0].copy()
         margins, straight = self._config.margins, known.corridor.straight
         least_m, most_m = (0.0, margins.graze_m) if straight else (-math.inf, _BESIDE_M)
         beside = _stands_within(known.bodies.moving, clearance_m, least_m, margins.lateral_m + most_m)
-        beside &= ~known.may_swing
         if np.count_nonzero(beside):
             beside &= placed.block_to_s_m[:, 0] > s_m
         if not np.count_nonzero(beside):
@@ -177,8 +173,9 @@ class StandingLimits:
             stretch_m = s_m - ALONGSIDE_M, float(placed.block_to_s_m[row, 0]) + known.corridor.front_m
             outline = outline_of(bodies, k, own[:, k], known.surfaces, known.corridor, stretch_m, depth_m)
             track_id = int(bodies.ids[k])
-            last = self._outlines[track_id] = _newest(outline, before.get(track_id, _NO_OUTLINE))
-            clearance_m[row] = max(clearance_m[row], min(last.clearance_m, outline.clearance_m))
+            whole_m = outline.clearance_m if outline.whole else before.get(track_id, -math.inf)
+            self._outlines_m[track_id] = whole_m
+            clearance_m[row] = max(clearance_m[row], min(whole_m, outline.clearance_m))
         return clearance_m
 
     def _stands_off_m(self, known: WorldModel, bodies: Bodies, placed: Placed) -> FloatArray:
@@ -210,11 +207,6 @@ class StandingLimits:
             self._config.margins.stop_m,
         )
         return needed <= gap.distance_m
-
-
-def _newest(now: Outline, before: Outline) -> Outline:
-    """The outline to go by: the last whole one; while there is none, the last one that the view cut."""
-    return now if now.whole or (now.cut and not before.whole) else before
 
 
 @compiled("boolean[:], float64[:], float64, float64")

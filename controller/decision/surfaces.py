@@ -40,7 +40,6 @@ class Surfaces:
     forward_m: (P,) distance ahead of the camera.
     half_band_m: (P,) half of the band's width there: a point stands for that much to either side.
     points_m: (P, 2) in the frame of the path.
-    eye_m: (2,) the camera in it.
     noise: of the camera's depth.
     """
 
@@ -49,7 +48,6 @@ class Surfaces:
     forward_m: FloatArray
     half_band_m: FloatArray
     points_m: FloatArray
-    eye_m: FloatArray
     noise: DepthNoise = TYPICAL_DEPTH_NOISE
 
     def of(self, bodies: Bodies) -> NDArray[np.bool_]:
@@ -57,9 +55,7 @@ class Surfaces:
         return _belongs(bodies, self.points_m, self.forward_m, _DEPTH_SIGMAS * self.noise.quadratic_per_m)
 
 
-NO_SURFACES = Surfaces(
-    np.zeros(0), np.zeros(0, np.intp), np.zeros(0), np.zeros(0), np.zeros((0, 2)), np.zeros(2)
-)
+NO_SURFACES = Surfaces(np.zeros(0), np.zeros(0, np.intp), np.zeros(0), np.zeros(0), np.zeros((0, 2)))
 
 
 def check_scan(free: FreeSpace) -> None:
@@ -147,7 +143,7 @@ def _belongs(
 @compiled(FreeSpace, PlanarPose, CameraMount)
 def _surfaces(
     free: FreeSpace, pose: PlanarPose, mount: CameraMount
-) -> tuple[FloatArray, NDArray[np.intp], FloatArray, FloatArray, FloatArray, FloatArray]:
+) -> tuple[FloatArray, NDArray[np.intp], FloatArray, FloatArray, FloatArray]:
     """The fields of Surfaces, as surfaces_of()."""
     bearing_tan, nearest_m = free.bearing_tan, free.nearest_m
     eye_x, eye_y, cos, sin = _eye(pose, mount)
@@ -164,8 +160,7 @@ def _surfaces(
         points[found, 0], points[found, 1] = eye_x + z * cos + right * sin, eye_y + z * sin - right * cos
         bands[found], forward[found], half_band[found] = b, z, z * free.half_width_tan
         found += 1
-    eye_m = np.array([eye_x, eye_y])
-    return seen, bands[:found], forward[:found], half_band[:found], points[:found], eye_m
+    return seen, bands[:found], forward[:found], half_band[:found], points[:found]
 
 
 @inlined

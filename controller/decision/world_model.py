@@ -55,7 +55,6 @@ class WorldModel:
 
     bodies: N boxes that count, those in view before those out of view (controller/decision/bodies.py).
     remembered: (N,) which of them are out of view.
-    may_swing: (N,) which of them are vehicles that may turn, with room for their ends.
     unboxed: M more bodies in view that count as surfaces only.
     surfaces: P points that depth saw, and how far it saw in each band (controller/decision/surfaces.py).
     corridor: the floor that the robot sweeps along the path.
@@ -81,7 +80,6 @@ class WorldModel:
         self.sight = Sight(self.corridor, mount, config, start_s_m)
         self.lens = LensCover()
         self.bodies = self._seen = no_bodies(0)
-        self.may_swing = np.zeros(0, np.bool_)
         self.surfaces = NO_SURFACES
         self.health = _GOOD
         self.fault = "no scene yet"
@@ -111,7 +109,7 @@ class WorldModel:
 
     def take_over(self, before: WorldModel) -> None:
         """Take over what does not depend on the path: bodies, velocities, surfaces, the camera's state."""
-        self.bodies, self.may_swing, self._boxes = before.bodies, before.may_swing, before._boxes
+        self.bodies, self._boxes = before.bodies, before._boxes
         self._seen, self._boxed, self._unboxed = before._seen, before._boxed, before._unboxed
         self._velocity_filter, self._out_of_view = before._velocity_filter, before._out_of_view
         self._known_places, self._turning = before._known_places, before._turning
@@ -192,7 +190,6 @@ class WorldModel:
         extended = with_hidden_near_sides(boxes, pose, self._mount, self.corridor.front_m, edges)
         extended = with_swinging_ends(extended, swing_m[boxed], pose, self.corridor.front_m)
         self.bodies = extended.joined(remembered)
-        self.may_swing = np.concatenate((swing_m[boxed] > 0.0, np.zeros(len(remembered), np.bool_)))
         self._boxes, self._seen, self._boxed, self._unboxed = boxes, seen, boxed, None
         self.lens.look(free, self.corridor.half_width_at(s_m), self._mount.left_m)
         self.sight.look(free, surfaces, pose, s_m, scene.captured_ns, boxes, standing)

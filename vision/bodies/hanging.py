@@ -4,7 +4,8 @@ A track begins as hanging or not (vision/bodies/births.py). It hangs no longer o
 the robot's height. It hangs again once nothing of it has been below that height for a while, and what is
 measured next below its lower end is farther away all along it: a sign or a bar over the way is one part with
 the post beside it, or with somebody behind it, for some frames. Below legs that give no depth, the floor is
-measured next, and it is as near as they are.
+measured next, and it is as near as they are. What the left or right border of the image cuts is not judged:
+there the legs of a table leave the view when the robot stands before it.
 
 vision/tracker.py calls it once the tracks have their cells. Terms: vision/__init__.py.
 """
@@ -21,7 +22,8 @@ from vision.depth.connected import MAX_JUMP, IntGrid
 from vision.depth.depth_grid import BoolGrid, DepthGrid, FloatGrid
 from vision.depth.regions import Regions
 
-_ENDS_SHARE = 0.8  # of the columns; two legs take up more than the rest of the lower end of a coat
+_ENDS_SHARE = 0.8  # of the columns: in the others something nearer hides its end, or depth is missing
+_LEG_COLUMNS = 3  # adjacent ones in which it stands: a leg of 5 cm, 2.5 m away with the camera of sim.yaml
 _FOR_S = 1.0  # as long as three steps, in which a leg behind the other one comes into view
 
 
@@ -34,7 +36,7 @@ def update(
     """
     low = reaching_down(grid, labels, len(tracks), body_height_m)
     tracks.overhead &= ~low
-    asked = (measured.cells > 0) & ~(low | tracks.overhead | tracks.mover)
+    asked = (measured.cells > 0) & measured.sides_visible & ~(low | tracks.overhead | tracks.mover)
     if not np.count_nonzero(asked):
         tracks.ends_above_s[:] = 0.0
         return
@@ -63,7 +65,7 @@ def _ends_above(
     for t in range(len(asked)):
         if not asked[t]:
             continue
-        lowest, ending = 0, 0
+        lowest, ending, standing = 0, 0, 0  # standing: adjacent columns with something as near below
         for j in range(max(boxes[t, 0], 0), min(boxes[t, 2] + 1, columns)):
             i = min(boxes[t, 3], rows - 1)
             while i >= 0 and labels[i, j] != t + 1:
@@ -74,6 +76,10 @@ def _ends_above(
             k = i + 1
             while k < rows and not (beyond[k, j] or inverse[k, j] > 0.0):
                 k += 1
-            ending += int(k < rows and inverse[k, j] < inverse[i, j] - jump)
-        ends[t] = lowest > 0 and ending >= _ENDS_SHARE * lowest
+            nearer = inverse[k, j] - inverse[i, j] if k < rows else np.float32(np.inf)
+            ending += int(nearer < -jump)
+            standing = standing + 1 if abs(nearer) <= jump else 0
+            if standing == _LEG_COLUMNS:
+                break
+        ends[t] = standing < _LEG_COLUMNS and ending >= max(_ENDS_SHARE * lowest, 1.0)
     return ends

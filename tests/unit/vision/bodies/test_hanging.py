@@ -71,11 +71,23 @@ def test_somebody_whose_legs_are_not_seen_does_not_hang(legs: str, below: FloatA
     assert not hangs(30, nearest(BAR, floor))
 
 
-@pytest.mark.parametrize(("legs_m", "expected"), [(0.3, True), (0.6, False)])
-def test_legs_that_take_up_a_fifth_of_the_width_count(legs_m: float, expected: bool) -> None:
-    """They give no depth; beside them the floor is seen into the distance. The coat is 2 m wide."""
+@pytest.mark.parametrize(("legs_m", "expected"), [(0.05, True), (0.15, False), (0.3, False)])
+def test_it_stands_on_legs_that_give_no_depth(legs_m: float, expected: bool) -> None:
+    """The floor before them is measured next. Fewer than three columns are noise; one is 4 cm wide there."""
     behind = (plate(3.0, (-0.5 * legs_m, 0.5 * legs_m), (-0.24, 0.6)) > 0.0) & (FLOOR > 3.0)
     assert hangs(30, nearest(BAR, np.where(behind, 0.0, FLOOR))) == expected
+
+
+def test_a_post_before_it_that_hides_a_few_columns_does_not_count() -> None:
+    post = plate(2.0, (-0.1, 0.1), (-0.1, 0.6))
+    assert hangs(11, nearest(BAR, post, FLOOR))
+
+
+def test_what_the_border_of_the_image_cuts_is_not_judged() -> None:
+    """A robot that stands before a table no longer sees its legs."""
+    table = plate(1.5, (-1.0, 1.0), (-0.36, -0.24))
+    assert table[:, 0].any()
+    assert not hangs(30, nearest(table, FLOOR), table)
 
 
 def test_in_front_of_what_is_beyond_the_range_it_hangs() -> None:
