@@ -26,7 +26,9 @@ def body(ends: int, agreement: FloatArray = AGREES) -> BodyVelocities:
 
 
 def added(ends: int, cut: bool) -> FloatArray:
-    return sliding.variance(body(ends), np.array([not cut, cut, not cut]), USE, SIGHT)[0]
+    (variance,) = sliding.variance(body(ends), np.array([not cut, cut, not cut]), USE, SIGHT)
+    result: FloatArray = variance
+    return result
 
 
 def test_few_fragments_of_a_cut_body_tell_no_speed_along_the_sight() -> None:
