@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 from ruckig import (  # type: ignore[import-not-found]  # a compiled module without stubs
     ControlInterface,
@@ -84,8 +82,12 @@ def test_each_ramp_may_start_from_its_own_speed() -> None:
 
 
 @given(st.floats(0.0, 2.0), st.floats(-0.8, 0.8))
+@example(0.4953454590745455, -0.77063679941108)
 def test_stop_steps_add_up_to_the_stop(v: float, a: float) -> None:
-    model = braking.stop(v, a, LIMITS)
+    """Where the deceleration just fades before the robot stands, a step more or less of it decides how long
+    the last millimetres take. So the time is that of a stop from the same speed, give or take a step."""
+    model, step_mps = braking.stop(v, a, LIMITS), abs(a) * 0.01
+    times_s = [braking.stop(max(v + off, 0.0), a, LIMITS).time_s for off in (-step_mps, 0.0, step_mps)]
     travelled = time = 0.0
     while v > 0.0 or abs(a) > 1e-9:
         before = v
@@ -95,4 +97,4 @@ def test_stop_steps_add_up_to_the_stop(v: float, a: float) -> None:
         time += 0.01
         assert time < 60.0
     assert travelled == pytest.approx(model.distance_m, abs=2e-3)
-    assert math.isclose(time, model.time_s, abs_tol=0.05)
+    assert min(times_s) - 0.05 <= time <= max(times_s) + 0.05
