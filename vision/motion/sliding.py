@@ -15,9 +15,7 @@ from numpy.typing import NDArray
 from hal.types import FloatArray
 from vision.motion.least_squares import BodyVelocities
 
-_MANY_ENDS = (
-    8  # four fragments; as for a proof of motion along the line of sight (vision/bodies/proof_rules.py)
-)
+_MANY_ENDS = 8  # four fragments, as for a proof of motion along the line of sight (proof_rules.py)
 _SLIDING_MPS = 3.0  # an end slides about as fast as its body and the robot move
 
 
