@@ -40,7 +40,8 @@ class Watched:
     placed: where they will be, at times from now, if they keep their velocity.
     velocities: relative to the path.
     enters: (N,) which are in the swept corridor or are likely to come into it, debounced.
-    could_enter: (N,) enters, and those out of view that may be nearer to the path than expected.
+    could_enter: (N,) the same without debounce, and those out of view that may be nearer to the path, or
+        faster, than expected.
     """
 
     bodies: Bodies
@@ -83,11 +84,25 @@ class Watch:
         # No debounce for a body that is in the corridor now, nor for one out of view: without measurements
         # there is no noise.
         at_once = np.where(comes, placed.clearance_m[:, 0] <= 0.0, self._remembered)
-        enters = could_enter = self._enters.update(bodies.ids, comes, at_once, now_s)
+        enters = self._enters.update(bodies.ids, comes, at_once, now_s)
+        could_enter = enters | comes
         if np.count_nonzero(self._remembered):
-            # A body out of view that approaches the path may be nearer to it than expected.
-            unsure_mps = UNSEEN_ERROR_SIGMAS * velocities.sigma_left_mps
-            inwards = -np.sign(placed.d_m[:, 0]) * velocities.left_mps > unsure_mps
-            nearer = likely_enters(placed, self._times_s, sigma_left_mps, unsure_mps * bodies.unseen_s)
-            could_enter = enters | (self._remembered & inwards & nearer)
+            could_enter |= self._may_come_unseen(placed, velocities, sigma_left_mps)
         return Watched(bodies, known.since_s, placed, velocities, enters, could_enter)
+
+    def _may_come_unseen(
+        self, placed: Placed, velocities: PathVelocities, sigma_left_mps: FloatArray
+    ) -> NDArray[np.bool_]:
+        """(N,) which bodies out of view approach the path and may come into it.
+
+        They may be nearer to it than where they are placed, and faster than when they were last seen: whoever
+        sets off as he leaves the view was measured while still slow. sigma_left_mps (N,): spread of the
+        sideways velocities.
+        """
+        to_path = -np.sign(placed.d_m[:, 0])
+        unsure_mps = UNSEEN_ERROR_SIGMAS * velocities.sigma_left_mps
+        faster_mps = np.maximum(to_path * velocities.innovation_left_mps, 0.0)
+        nearer_m = (unsure_mps + faster_mps) * self._bodies.unseen_s
+        inwards = to_path * velocities.left_mps > unsure_mps
+        comes = likely_enters(placed, self._times_s, sigma_left_mps - faster_mps, nearer_m)
+        return self._remembered & inwards & comes
