@@ -7,8 +7,10 @@ body of the last scene that is missing in this one is kept while its place is no
   or with a surface in it), a seen body covers it, or it lies 2 m behind the camera. If it goes missing while
   the robot stands, it has moved away itself: dropped. If it is kept just inside the side edge of the view:
   dropped once a standing robot sees through its place (controller/decision/seen_through.py).
-* Moving: extrapolated with its last velocity for 2 s, or for 6 s if that leads towards the robot's axis or
-  along with the robot. Dropped earlier if its place is well within the view or 2 m behind the camera.
+* Moving, but at rest within the noise when it sank below the view: it has stopped there, and is kept as
+  standing (controller/decision/unseen_motion.py).
+* Moving otherwise: extrapolated with its last velocity for 2 s, or for 6 s if that leads towards the robot's
+  axis or along with the robot. Dropped earlier if its place is well within the view or 2 m behind the camera.
 * Judged standing (a verdict takes some frames), but clearly measured as approaching (or as moving anywhere,
   if seen for 0.5 to 1 s): counts as moving, with the velocity measured last, even if the robot stands
   (controller/decision/unseen_motion.py).
@@ -42,6 +44,7 @@ from controller.decision.unseen_motion import (
     agrees,
     as_tall_as_a_person,
     may_enter_way,
+    stopped_below_view,
     unseen_or_approaching,
     with_measured_velocity,
 )
@@ -77,6 +80,7 @@ class OutOfView:
         self._seen_through = SeenThrough(mount)
         self._bodies = no_bodies(0)
         self._since_s: FloatArray = np.zeros(0)
+        self._stands_since_ns: int | None = None
         # Of bodies that are judged standing but clearly approached: by id, when last, and how fast.
         self._approached: dict[int, tuple[int, FloatArray]] = {}
         self._widest_of, self._widest_half_m = np.zeros(0, np.int64), np.zeros(0)
@@ -120,11 +124,13 @@ class OutOfView:
         """The bodies out of view that count in addition to seen.
 
         before: the bodies seen in the scene before this one. standing: the robot stands. free: free space of
-        this scene. A standing body that vanishes while the robot stands has moved away and is dropped; so is
-        one that was part of a body that is still seen.
+        this scene. A standing body that was last seen while the robot stood has moved away and is dropped; so
+        is one that was part of a body that is still seen.
         """
         dt_s = (seen.captured_ns - before.captured_ns) / NS_PER_S
-        bodies, since_s = self._with_missing(before, seen, dt_s, standing)
+        if not standing or self._stands_since_ns is None:
+            self._stands_since_ns = seen.captured_ns if standing else None
+        bodies, since_s = self._with_missing(before, seen, dt_s, pose, edges)
         if not len(bodies):
             self._seen_through.forget()
             return no_bodies(seen.captured_ns)
@@ -161,20 +167,35 @@ class OutOfView:
         return lately
 
     def _with_missing(
-        self, before: Bodies, seen: Bodies, dt_s: float, standing: bool
+        self, before: Bodies, seen: Bodies, dt_s: float, pose: PlanarPose, edges: ViewEdges
     ) -> tuple[Bodies, FloatArray]:
         """The bodies kept so far, then those of before that are missing in seen; and since when, in seconds.
 
-        The latter move, or have stood long enough to be believed and vanished while the robot drove.
+        The latter move, or have stood long enough to be believed and were last seen while the robot drove, or
+        stopped before they sank below the view.
         """
         bodies, since_s = self._bodies, self._since_s + dt_s
         missing = _missing(before.ids, seen.ids)
         if not np.count_nonzero(missing):
             return bodies, since_s
         gone = with_measured_velocity(before.select(missing), self._mistaken_mps)
-        gone = gone.select(gone.moving | ((gone.age_s >= MIN_TRACKED_S) & (not standing)))
+        stopped = stopped_below_view(gone, pose, self._mount, edges)
+        stood = stopped | (~gone.moving & self._last_seen_driving(gone))
+        if np.count_nonzero(stopped):
+            velocity = np.where(stopped[:, None], 0.0, gone.velocity_mps)
+            gone = replace(gone, velocity_mps=velocity, moving=gone.moving & ~stopped)
+        gone = gone.select(gone.moving | (stood & (gone.age_s >= MIN_TRACKED_S)))
         gone = gone.select(~_parts_of_movers(gone, seen))
         return bodies.joined(gone), np.concatenate((since_s, np.full(len(gone), dt_s)))
+
+    def _last_seen_driving(self, bodies: Bodies) -> BoolArray:
+        """(N,) which bodies were last seen before the robot came to rest, if it stands now.
+
+        Perception predicts what it no longer sees for a while, and meanwhile the robot may have stopped.
+        """
+        if self._stands_since_ns is None:
+            return np.ones(len(bodies), np.bool_)
+        return np.asarray(bodies.captured_ns - bodies.unseen_s * NS_PER_S < self._stands_since_ns)
 
     def _still_there(
         self, bodies: Bodies, since_s: FloatArray, seen: Bodies, out: BoolArray, pose: PlanarPose

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.decision.bodies import Bodies
+from controller.decision.view_edges import ViewEdges, ahead_and_left, is_below_view
 from hal.compiled import compiled, inlined
 from hal.directions import along_and_left
-from hal.types import FloatArray, PlanarPose
+from hal.types import CameraMount, FloatArray, PlanarPose
 
 BoolArray = NDArray[np.bool_]
 
@@ -35,6 +36,8 @@ _SURE_MOVE_SIGMAS, _VERDICT_TRUSTED_S = 5.0, 1.0
 # A body out of view that moves away from the robot's axis may cut in only if it goes along with the robot: if
 # its speed forward is more than this many times its speed outwards. Otherwise it has turned off.
 _ALONG_TO_OUTWARD_RATIO = 4.0
+# A speed within this many standard deviations of 0 is no motion of what is about to stop.
+_AT_REST_SIGMAS = 2.5
 # Velocities that differ by more standard deviations than this belong to two different bodies.
 _SAME_VELOCITY_SIGMAS = 2.0
 
@@ -121,6 +124,28 @@ def with_measured_velocity(bodies: Bodies, mistaken_mps: float) -> Bodies:
         return bodies
     velocity = np.where(goes[:, None], bodies.measured_mps, bodies.velocity_mps)
     return replace(bodies, velocity_mps=velocity, moving=bodies.moving | goes)
+
+
+@compiled(Bodies, PlanarPose, CameraMount, ViewEdges)
+def stopped_below_view(bodies: Bodies, pose: PlanarPose, mount: CameraMount, edges: ViewEdges) -> BoolArray:
+    """(N,) which movers are below the view, ahead of a camera at pose, and hardly moved when last seen.
+
+    A verdict takes some frames: what has stopped still counts as moving when it sinks below the view. Their
+    speed was within _AT_REST_SIGMAS standard deviations of 0.
+    """
+    stopped = np.zeros(len(bodies.moving), np.bool_)
+    for k in range(len(stopped)):
+        ahead, left = ahead_and_left(bodies.xy_m[k], pose, mount)
+        near = ahead - bodies.half_view_m[k]
+        if not bodies.moving[k] or ahead <= 0.0 or abs(left) > edges.edge_tan * ahead:
+            continue
+        (x, y), spread = bodies.velocity_mps[k], bodies.covariance[k]
+        # As in _moves_before_verdict.
+        squared = x * x + y * y
+        variance = x * spread[0, 0] * x + x * (spread[0, 1] + spread[1, 0]) * y + y * spread[1, 1] * y
+        at_rest = squared**2 <= _AT_REST_SIGMAS**2 * variance
+        stopped[k] = at_rest and is_below_view(bodies, k, near, mount.height_m, edges)
+    return stopped
 
 
 def hardly_stood(bodies: Bodies) -> BoolArray:

@@ -101,12 +101,18 @@ def _highest_seen_m(ahead_m: float, height_m: float, up_tan: float) -> float:
 
 
 @inlined
+def is_below_view(bodies: Bodies, k: int, near_face_m: float, height_m: float, edges: ViewEdges) -> bool:
+    """Whether body k is entirely below the view. near_face_m, height_m: as of beyond_edges()."""
+    lowest_m = _lowest_seen_m(near_face_m, height_m, edges.near_m)
+    return bool(near_face_m < edges.near_m and bodies.top_m[k] < lowest_m + UNCERTAIN_M)
+
+
+@inlined
 def is_beyond_edges(bodies: Bodies, k: int, near_face_m: float, height_m: float, edges: ViewEdges) -> bool:
     """As beyond_edges(), for body k."""
-    lowest_m = _lowest_seen_m(near_face_m, height_m, edges.near_m)
-    below = near_face_m < edges.near_m and bodies.top_m[k] < lowest_m + UNCERTAIN_M
     highest_m = _highest_seen_m(near_face_m, height_m, edges.up_tan)
-    return bool(below or bodies.bottom_m[k] > highest_m - UNCERTAIN_M)
+    above = bodies.bottom_m[k] > highest_m - UNCERTAIN_M
+    return bool(above or is_below_view(bodies, k, near_face_m, height_m, edges))
 
 
 @compiled(Bodies, "float64[:], float64", ViewEdges)

@@ -153,7 +153,8 @@ def test_closing_in_on_the_target_is_no_wish_to_go_faster(
 )
 def test_reason_says_that_the_awaited_body_is_not_seen(forward_mps: float, rule: str, what: str) -> None:
     """Below the view of a camera that sees the floor from 1.3 m on; somebody may have carried it away."""
-    bench, pallet = Bench(), obstacle(2.2, 0.0, forward_mps, size_m=(0.5, 0.1))
+    pallet = obstacle(2.2, 0.0, forward_mps, size_m=(0.5, 0.1), sigma_mps=0.05)
+    bench = Bench()
     bench.settle(pallet, v_mps=0.3)
     for _ in range(76):
         decision = bench.step(bench.scene(x_m=0.8), 0.05, x_m=0.8)

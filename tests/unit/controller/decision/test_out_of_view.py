@@ -37,8 +37,19 @@ def test_body_that_vanishes_far_away_is_dropped() -> None:
 
 def test_body_that_vanishes_while_the_robot_stands_is_dropped() -> None:
     recall = Recall()
-    recall.see(PALLET, 3.6)
+    recall.see(PALLET, 3.6, standing=True)
     assert recall.see(None, 3.6, standing=True) == []
+
+
+def test_body_that_the_stopping_robot_loses_from_view_is_not_forgotten_at_rest() -> None:
+    """It was last seen before the stop; until it is given up as missing, perception predicts it."""
+    recall = Recall()
+    recall.see(PALLET, 3.2)
+    for unseen_s in (0.1, 0.2, 0.3):
+        predicted = replace(PALLET, unseen_s=np.array([unseen_s]))
+        assert recall.see(predicted, 3.6, standing=unseen_s > 0.15) == []
+    for _ in range(100):
+        assert recall.see(None, 3.6, standing=True) == [1]
 
 
 def test_body_seen_too_briefly_is_not_kept() -> None:
@@ -252,10 +263,20 @@ def test_body_is_excluded_only_where_the_view_is_seen_through_without_a_gap() ->
 
 
 def test_body_too_low_for_the_near_view_may_still_be_there() -> None:
-    recall = Recall()
-    recall.recall(replace(LEAVING, top_m=np.array([0.2])), 0.0, ALL_SEEN, standing=True)
+    recall, low = Recall(), replace(LEAVING, top_m=np.array([0.2]), velocity_mps=np.array([[-0.3, -0.3]]))
+    recall.recall(low, 0.0, ALL_SEEN, standing=True)
     kept = recall.recall(None, 0.0, ALL_SEEN, standing=True)
-    assert kept.xy_m[0].tolist() == pytest.approx([0.99, 0.19])
+    assert kept.xy_m[0].tolist() == pytest.approx([0.97, 0.17])
+
+
+def test_what_has_stopped_before_it_sinks_below_the_view_is_not_forgotten() -> None:
+    """Still judged moving, as verdicts take some frames, and measured at 0.14 m/s with 0.1 m/s of noise."""
+    recall = Recall()
+    recall.recall(replace(LEAVING, top_m=np.array([0.2])), 0.0, ALL_SEEN)
+    for _ in range(100):  # for ten seconds
+        kept = recall.recall(None, 0.0, ALL_SEEN, standing=True)
+    assert kept.moving.tolist() == [False]
+    assert kept.xy_m[0].tolist() == pytest.approx([1.0, 0.2])
 
 
 def test_the_longer_it_is_unseen_beside_the_view_the_less_is_known_of_its_velocity() -> None:
