@@ -18,6 +18,7 @@ The files in the order of one control step:
 * unseen_position.py - where the movers among them are expected
 * view_edges.py - what is below, above or beside the view
 * seen_through.py - whether the place of a body that went missing is seen, and seen empty
+* lately_moved.py - which bodies only pause: they moved a moment ago
 * lens_cover.py - whether something covers the lens
 * corridor.py - the swept width along the path, and bodies in path coordinates
 * sight.py - how far the corridor was seen free, and unexplained surfaces in it
@@ -29,7 +30,7 @@ The files in the order of one control step:
 * speed_limits.py - asks the advisers: depth (sight.py), standing, moving, worst case
 * standing_limits.py - bodies that stand in the corridor
 * outline.py - in bends, how far beside the corridor a body stands
-* watched.py - the bodies that move or are young: where they will be, which enter the corridor
+* watched.py - the bodies that move, pause or are young: where they will be, which enter the corridor
 * crossing.py - which are likely to enter; the conflicts with them, and which speeds solve these
 * debounce.py - debounced flags for that
 * moving_limits.py - bodies that cross, come towards the robot or drive ahead
@@ -46,8 +47,8 @@ Words of this folder:
 * Corridor, swept width: the floor that the robot sweeps along its path. Path coordinates: s_m, d_m.
 * Surface: a point that depth sees. Explained: it belongs to a body. Band: one bearing of the scan.
 * Known: the floor was seen free. Assumed free: floor below the view at the start, taken as free unseen.
-* Watched: moves or is young. Enters: is in the corridor or is likely to come into it. Conflict: the time
-  and place of that.
+* Watched: moves, pauses or is young. Enters: is in the corridor or is likely to come into it. Conflict: the
+  time and place of that.
 * Innovation: by how much the newest velocity differs from the average beyond noise, counted twice.
 * Position uncertainty: of a body out of view; it grows until the body is seen again.
 * Limit: a speed not to be exceeded now. Urgent: comfortable braking no longer suffices.

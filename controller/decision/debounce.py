@@ -20,6 +20,12 @@ class Debounced:
         """Note a break in the observations: times start anew after it. The flags stay as they are."""
         self._otherwise_since_s.clear()
 
+    def flags(self, ids: NDArray[np.int64]) -> BoolArray:
+        """(N,) the flags of ids as they are; a new one is False."""
+        return np.fromiter(
+            (self._flags.get(track_id, False) for track_id in ids.tolist()), np.bool_, len(ids)
+        )
+
     def update(self, ids: NDArray[np.int64], seen: BoolArray, at_once: BoolArray, now_s: float) -> BoolArray:
         """(N,) the flags of ids at now_s; other ids are forgotten, and a new one begins with False.
 

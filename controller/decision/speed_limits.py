@@ -13,8 +13,8 @@ and camera. The advisers, in the order in which they are called:
 
 Words for the bodies that controller/decision/world_model.py knows:
 
-* watched: bodies that move or have been seen for less than confirm_s. Advisers 3 and 4 look at these alone
-  (controller/decision/watched.py).
+* watched: bodies that move, only pause (lately_moved.py) or have been seen for less than confirm_s.
+  Advisers 3 and 4 look at these alone (controller/decision/watched.py).
 * remembered: bodies out of the camera's view, kept by controller/decision/out_of_view.py.
 """
 

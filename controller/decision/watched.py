@@ -1,10 +1,12 @@
-"""The watched bodies: those that move or are young, with where they will be and which of them enter the way.
+"""The watched bodies: those that move, pause or are young, with where they will be and which enter the way.
 
 Watch selects them once a scene, and places and judges them in each control step. The advisers that deal with
 motion (moving_limits.py and worst_case_limit.py) get them as one record, Watched.
 """
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +37,7 @@ _NO_FLAGS = np.zeros(0, np.bool_)
 class Watched:
     """N watched bodies in one control step.
 
-    bodies: as they were in their scene.
+    bodies: as they were in their scene; those that pause are among the moving ones, with velocity 0.
     since_s: time since that scene.
     placed: where they will be, at times from now, if they keep their velocity.
     velocities: relative to the path.
@@ -62,12 +64,16 @@ class Watch:
         self._config, self._times_s = config, times_s
         self._enters = Debounced(_DEBOUNCE_S)
         self._bodies = no_bodies(0)
-        self._remembered = _NO_FLAGS
+        self._remembered = self._pausing = _NO_FLAGS
 
     def take_in(self, known: WorldModel) -> None:
         """Select the watched bodies of a new scene."""
-        watched = known.bodies.moving | (known.bodies.age_s < self._config.prediction.confirm_s)
+        young = known.bodies.age_s < self._config.prediction.confirm_s
+        watched = known.bodies.moving | known.pausing | young
         self._bodies = known.bodies.select(watched)
+        self._pausing = known.pausing[watched] if len(self._bodies) else _NO_FLAGS
+        if np.count_nonzero(self._pausing):
+            self._bodies = replace(self._bodies, moving=self._bodies.moving | self._pausing)
         self._remembered = known.remembered[watched] if len(self._bodies) else _NO_FLAGS
 
     def step(self, known: WorldModel, s_m: float, now_s: float) -> Watched | None:
@@ -84,7 +90,10 @@ class Watch:
         # No debounce for a body that is in the corridor now, nor for one out of view: without measurements
         # there is no noise.
         at_once = np.where(comes, placed.clearance_m[:, 0] <= 0.0, self._remembered)
-        enters = self._enters.update(bodies.ids, comes, at_once, now_s)
+        # A pause is no sign of going elsewhere: whoever goes on afterwards comes in as before.
+        heads_in = np.where(self._pausing, self._enters.flags(bodies.ids), comes)
+        heads_in = self._enters.update(bodies.ids, heads_in, at_once, now_s)
+        enters = np.where(self._pausing, comes, heads_in)
         could_enter = enters | comes
         if np.count_nonzero(self._remembered):
             could_enter |= self._may_come_unseen(placed, velocities, sigma_left_mps)

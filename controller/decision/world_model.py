@@ -24,6 +24,7 @@ from controller.decision.bodies import Bodies, no_bodies
 from controller.decision.corridor import Corridor
 from controller.decision.cut_movers import with_hidden_near_sides
 from controller.decision.known_places import KnownPlaces
+from controller.decision.lately_moved import LatelyMoved
 from controller.decision.lens_cover import LensCover
 from controller.decision.limits import STANDING_MPS
 from controller.decision.obstacle_boxes import bodies_of
@@ -55,6 +56,7 @@ class WorldModel:
 
     bodies: N boxes that count, those in view before those out of view (controller/decision/bodies.py).
     remembered: (N,) which of them are out of view.
+    pausing: (N,) which stand, but moved a moment ago.
     unboxed: M more bodies in view that count as surfaces only.
     surfaces: P points that depth saw, and how far it saw in each band (controller/decision/surfaces.py).
     corridor: the floor that the robot sweeps along the path.
@@ -94,6 +96,8 @@ class WorldModel:
         self._out_of_view = OutOfView(mount, robot.limits.max_obstacle_speed_mps)
         self.edges = ViewEdges(edge_tan=0.5, near_m=config.sight.near_m, up_tan=math.inf)
         self._known_places = KnownPlaces()
+        self._lately_moved = LatelyMoved()
+        self.pausing: NDArray[np.bool_] = np.zeros(0, np.bool_)
         self._turning = TurningVehicles(config.margins.stop_m - config.margins.least_m)
         self._captured_ns: int | None = None
         self._scene_fault = ""
@@ -113,6 +117,7 @@ class WorldModel:
         self._seen, self._boxed, self._unboxed = before._seen, before._boxed, before._unboxed
         self._velocity_filter, self._out_of_view = before._velocity_filter, before._out_of_view
         self._known_places, self._turning = before._known_places, before._turning
+        self._lately_moved, self.pausing = before._lately_moved, before.pausing
         self._poses, self.surfaces, self.lens = before._poses, before.surfaces, before.lens
         self.health, self.edges = before.health, before.edges
         self._captured_ns, self._scene_fault = before._captured_ns, before._scene_fault
@@ -191,6 +196,8 @@ class WorldModel:
         extended = with_swinging_ends(extended, swing_m[boxed], pose, self.corridor.front_m)
         self.bodies = extended.joined(remembered)
         self._boxes, self._seen, self._boxed, self._unboxed = boxes, seen, boxed, None
+        self._lately_moved.look(boxes)
+        self.pausing = self._lately_moved.pausing(self.bodies)
         self.lens.look(free, self.corridor.half_width_at(s_m), self._mount.left_m)
         self.sight.look(free, surfaces, pose, s_m, scene.captured_ns, boxes, standing)
         self._known_places.remember(scene.captured_ns, surfaces.points_m, seen)

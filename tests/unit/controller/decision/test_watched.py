@@ -19,10 +19,16 @@ from tests.support.floor_bodies import box, line_path
 CORRIDOR = Corridor(line_path(), Body(width_m=0.8, length_m=1.0, rear_m=0.5))
 
 
-def watched(body: Bodies, *, remembered: bool = False) -> Watched:
+def watched(body: Bodies, *, remembered: bool = False, pausing: bool = False) -> Watched:
     """By a watch that sees body for the first time, with a robot at 0."""
     watch = Watch(DecisionConfig(), np.arange(0.0, 6.0, 0.1))
-    known = SimpleNamespace(bodies=body, remembered=np.array([remembered]), corridor=CORRIDOR, since_s=0.0)
+    known = SimpleNamespace(
+        bodies=body,
+        remembered=np.array([remembered]),
+        pausing=np.array([pausing]),
+        corridor=CORRIDOR,
+        since_s=0.0,
+    )
     watch.take_in(cast(WorldModel, known))
     found = watch.step(cast(WorldModel, known), 0.0, 10.0)
     assert found is not None
