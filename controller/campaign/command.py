@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shlex
 import sys
 import time
@@ -196,7 +197,9 @@ def format_row(row: Row) -> str:
     if row.time_s is None:
         took = "not reached" if row.expected else "not reached, as it should be"
     else:
-        took = f"reached in {row.time_s:.2f} s, {time_ratio(row):.2f} x the oracle's"
+        ratio = time_ratio(row)
+        compared = "not compared with the oracle" if math.isnan(ratio) else f"{ratio:.2f} x the oracle's"
+        took = f"reached in {row.time_s:.2f} s, {compared}"
     verdict = f"FAILED: {why_failed(row)}" if failed(row) else "ok"
     return (
         f"{row.policy:<8} {took}; contacts {row.contacts} ({row.contacts_at_fault} at fault), "

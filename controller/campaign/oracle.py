@@ -26,8 +26,10 @@ from controller.campaign.stage import Stage
 from hal.compiled import compiled
 from hal.types import FloatArray
 
-# Speeds above 0: at 1.5 m/s and 0.3 m/s^2 a step of time is 0.21 s, and one of the way 6.5 mm.
-_LEVELS = 24
+# Speeds above 0: at 1.5 m/s and 0.3 m/s^2 a step of time is 0.21 s, and one of the way 6.5 mm. A slow robot
+# gets fewer, so that no step of time is shorter than _LEAST_STEP_S: the work grows with the cube of their
+# number.
+_LEVELS, _LEAST_STEP_S = 24, 0.1
 _GRID_M = 0.01  # of the speeds along the path; they are asked for at every tenth place
 _NEVER = -1
 
@@ -45,13 +47,14 @@ class Lattice:
     """The lattice for one top speed and acceleration. length_m is rounded to it (about 5 mm)."""
 
     def __init__(self, top_mps: float, accel_mps2: float, length_m: float) -> None:
-        self.dt_s = top_mps / (_LEVELS * accel_mps2)
-        self.speeds_mps = accel_mps2 * self.dt_s * np.arange(_LEVELS + 1)
+        self._levels = max(min(_LEVELS, math.floor(top_mps / (accel_mps2 * _LEAST_STEP_S))), 1)
+        self.dt_s = top_mps / (self._levels * accel_mps2)
+        self.speeds_mps = accel_mps2 * self.dt_s * np.arange(self._levels + 1)
         self.step_m = 0.5 * accel_mps2 * self.dt_s**2
         # From rest to rest, the lattice reaches only even numbers of position steps.
         self.end = 2 * round(0.5 * length_m / self.step_m)
         self._all_positions = (1 << (self.end + 1)) - 1
-        self._allowed = [self._all_positions] * (_LEVELS + 1)
+        self._allowed = [self._all_positions] * (self._levels + 1)
 
     def limit(self, s_m: FloatArray, speed_mps: FloatArray) -> None:
         """Remove states faster than speed_mps (N,) at s_m (N,), which must increase."""
@@ -64,7 +67,7 @@ class Lattice:
 
         blocked: for each step, the intervals of s that are blocked.
         """
-        states = [1] + [0] * _LEVELS
+        states = [1] + [0] * self._levels
         for step, intervals in enumerate(blocked):
             if step:
                 states = self._step(states)
@@ -86,7 +89,7 @@ class Lattice:
             bits = states[k] << (2 * k)
             if k > 0:
                 bits |= states[k - 1] << (2 * k - 1)
-            if k < _LEVELS:
+            if k < self._levels:
                 bits |= states[k + 1] << (2 * k + 1)
             next_states.append(bits & allowed)
         return next_states

@@ -6,6 +6,7 @@ from config.app import AppConfig, LockstepRunner, load_app
 from controller.errors import UserError
 from controller.mission.blind_bends import blind_bend_warning
 from controller.mission.close_by import close_by_warning
+from controller.mission.floor_view import floor_view_warning
 from controller.mission.lockstep_drive import drive_lockstep
 from controller.mission.options import MissionOptions, scenario_as_typed
 from controller.mission.possible_world import require_possible_world
@@ -15,6 +16,14 @@ from controller.mission.short_arcs import short_arc_warning
 from controller.mission.summary import summary_rows
 from controller.record.observations import STANDARD_OUTPUT
 from controller.terminal.console import Console
+
+_WARNINGS = (
+    short_arc_warning,
+    close_by_warning,
+    floor_view_warning,
+    blind_bend_warning,
+    unused_faults_warning,
+)
 
 
 def run_mission(options: MissionOptions) -> int:
@@ -29,7 +38,7 @@ def run_mission(options: MissionOptions) -> int:
         )
     console = Console(options.quiet, aside=options.observations == STANDARD_OUTPUT)
     require_possible_world(config)
-    for warning_of in (short_arc_warning, close_by_warning, blind_bend_warning, unused_faults_warning):
+    for warning_of in _WARNINGS:
         warning = warning_of(config)
         if warning is not None:
             console.warning(warning)

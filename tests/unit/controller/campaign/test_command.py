@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner
 
 from config.loader import CONFIG_DIR
-from controller.campaign.command import CampaignOptions, command_line
+from controller.campaign.command import CampaignOptions, command_line, format_row
 from controller.campaign.plan import Mission, missions, run_local
 from controller.campaign.store import MISSIONS, SETTINGS
 from controller.campaign.task import Task, run_task
@@ -167,6 +167,11 @@ def test_single_mission_prints_its_result() -> None:
         r"clearance \d\.\d\d m, false stops 0, flaps 0: ok\n",
         output,
     )
+
+
+def test_a_target_that_even_the_oracle_misses_is_compared_with_nothing() -> None:
+    assert "reached in 11.00 s, 1.10 x the oracle's; " in format_row(made_row(1))
+    assert "reached in 11.00 s, not compared with the oracle; " in format_row(made_row(1, oracle_time_s=None))
 
 
 @pytest.mark.parametrize(

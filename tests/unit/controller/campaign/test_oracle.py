@@ -41,6 +41,16 @@ def test_the_lattice_arrives_within_a_step_of_the_trapezoid() -> None:
     assert exact - lattice.dt_s <= steps * lattice.dt_s <= exact + 2 * lattice.dt_s
 
 
+@pytest.mark.parametrize(("top_mps", "step_s"), [(0.02, 0.0667), (0.05, 0.1667), (0.3, 0.1)])
+def test_a_slow_robot_needs_no_finer_steps(top_mps: float, step_s: float) -> None:
+    """With as many speeds as at 1.5 m/s a step would be 3 ms at 0.02 m/s, and one mission take minutes."""
+    lattice = Lattice(top_mps, ACCEL, 2.0)
+    assert lattice.dt_s == pytest.approx(step_s, rel=0.01)
+    exact = 2.0 / top_mps + top_mps / ACCEL
+    steps = lattice.steps_to_end([[] for _ in range(2000)])
+    assert exact - lattice.dt_s <= steps * lattice.dt_s <= exact + 2 * lattice.dt_s
+
+
 def test_oracle_never_passes_a_body_that_stays_on_the_path() -> None:
     best = oracle.solve(stage(crate(6.0), length_m=10.0), TOP, 60.0)
     assert math.isinf(best.total_s)
