@@ -79,24 +79,45 @@ def measure(grid: DepthGrid, labels: IntGrid, count: int) -> Regions:
 
 
 @inlined
-def _edges(labels: IntGrid, count: int) -> tuple[Integers, Integers]:
-    """(R,) number of cells of parts 1..count of labels (h, w), and (R, 4) their left, top, right, bottom.
+def _runs_of(labels: IntGrid, count: int) -> IntGrid:
+    """(K, 4) runs of cells of one of the parts 1..count of labels (h, w) that lie side by side in a row.
+
+    Of each: the part's index, the row, the first column, and the one after the last.
+    """
+    height, width = labels.shape
+    runs, number = np.empty((labels.size, 4), np.int32), 0
+    for i in range(height):
+        before = 0
+        for j in range(width):
+            here = labels[i, j]
+            if here == before:
+                continue
+            if 0 < before <= count:
+                runs[number, 3] = j
+                number += 1
+            if 0 < here <= count:
+                runs[number, 0], runs[number, 1], runs[number, 2] = here - 1, i, j
+            before = here
+        if 0 < before <= count:
+            runs[number, 3] = width
+            number += 1
+    return runs[:number]
+
+
+@inlined
+def _edges(runs: IntGrid, count: int) -> tuple[Integers, Integers]:
+    """(R,) number of cells of each part with runs (K, 4), and (R, 4) their left, top, right, bottom.
 
     These are columns and rows of the grid; 0, 0, 0, -1 for parts without cells.
     """
-    height, width = labels.shape
     cells, edges = np.zeros(count, np.intp), np.zeros((count, 4), np.intp)
     edges[:, 3] = -1
-    for i in range(height):
-        for j in range(width):
-            part = labels[i, j] - 1
-            if part < 0 or part >= count:
-                continue
-            edge = edges[part]
-            if cells[part] == 0:
-                edge[0], edge[1], edge[2] = j, i, j
-            cells[part] += 1
-            edge[0], edge[2], edge[3] = min(edge[0], j), max(edge[2], j), i
+    for part, row, first, end in runs:
+        edge = edges[part]
+        if cells[part] == 0:
+            edge[0], edge[1], edge[2] = first, row, first
+        cells[part] += end - first
+        edge[0], edge[2], edge[3] = min(edge[0], first), max(edge[2], end - 1), row
     return cells, edges
 
 
@@ -120,9 +141,9 @@ def _foot_px(
 
 @inlined
 def _sums(
-    inverse: FloatGrid, labels: IntGrid, x: FloatGrid, y: FloatGrid, edges: Integers
+    inverse: FloatGrid, runs: IntGrid, x: FloatGrid, y: FloatGrid, edges: Integers
 ) -> tuple[FloatArray, FloatArray]:
-    """Sums over each part with edges (R, 4), (R, 4): inverse depth, its square, x, y.
+    """Sums over each part with runs (K, 4) and edges (R, 4), (R, 4): inverse depth, its square, x, y.
 
     And sums over its left and over its right rim, (R, 4): cells, inverse depth. The width is measured with
     each rim at its own depth, since a body seen along one of its sides would seem too wide at the depth of
@@ -130,23 +151,23 @@ def _sums(
     """
     count = len(edges)
     sums, rims = np.zeros((count, 4)), np.zeros((count, 4))
-    for i in range(labels.shape[0]):
-        for j in range(labels.shape[1]):
-            part = labels[i, j] - 1
-            if part < 0 or part >= count:
-                continue
-            value, left, right = float(inverse[i, j]), edges[part, 0], edges[part, 2]
-            rim = (right - left) // _RIM
-            sums[part, 0] += value
-            sums[part, 1] += value * value
-            sums[part, 2] += x[j]
-            sums[part, 3] += y[i]
-            if j <= left + rim:
-                rims[part, 0] += 1.0
-                rims[part, 1] += value
-            if j >= right - rim:
-                rims[part, 2] += 1.0
-                rims[part, 3] += value
+    for part, row, first, end in runs:
+        left, right = edges[part, 0], edges[part, 2]
+        rim = (right - left) // _RIM
+        total, squares, total_x, total_y = sums[part]
+        for j in range(first, end):
+            value = float(inverse[row, j])
+            total += value
+            squares += value * value
+            total_x += x[j]
+            total_y += y[row]
+        sums[part] = total, squares, total_x, total_y
+        for j in range(first, min(end, left + rim + 1)):
+            rims[part, 0] += 1.0
+            rims[part, 1] += inverse[row, j]
+        for j in range(max(first, right - rim), end):
+            rims[part, 2] += 1.0
+            rims[part, 3] += inverse[row, j]
     return sums, rims
 
 
@@ -160,9 +181,10 @@ def _measured(
     height_m: of the camera, NaN where the floor is not known. up (3,): the floor's normal.
     """
     x, y, step_px, offset_px = grid.x, grid.y, grid.step_px, grid.offset_px
-    (cells, edges), rows = _edges(labels, count), np.zeros(count, np.intp)
+    runs, rows = _runs_of(labels, count), np.zeros(count, np.intp)
+    cells, edges = _edges(runs, count)
     sides_visible, top_and_bottom_visible = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
-    sums, rims = _sums(grid.inverse_depth, labels, x, y, edges)
+    sums, rims = _sums(grid.inverse_depth, runs, x, y, edges)
     bbox_px, position_m, extent_m = np.zeros((count, 4)), np.zeros((count, 3)), np.zeros((count, 3))
     for part in range(count):
         if cells[part] == 0:
