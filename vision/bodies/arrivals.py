@@ -11,7 +11,9 @@ It takes the depth grid and the camera's pose. vision/tracker.py calls it first 
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from dataclasses import dataclass
+from operator import attrgetter
 
 import cv2
 import numpy as np
@@ -48,6 +50,7 @@ MUCH_ARRIVED_CELLS = 20  # about a forearm 4 m away
 MUCH_ARRIVED_SHARE = 0.2  # more than a rim that noise widens
 _UNKNOWN = np.float32(1e3)  # 1/m, where nothing was measured: no surface is nearer, so none can arrive there
 NEIGHBOURHOOD = np.ones((3, 3), np.uint8)  # of a cell: the cells that can confirm it
+_stamp_ns = attrgetter("stamp_ns")
 
 
 def arriving(arrived: NDArray[np.intp], cells: NDArray[np.intp]) -> NDArray[np.bool_]:
@@ -98,7 +101,7 @@ class ViewMemory:
 
     def __init__(self, noise: DepthNoise) -> None:
         self._noise = noise
-        self._views: list[EarlierView] = []
+        self._views: list[EarlierView] = []  # in the order of time
 
     def clear(self) -> None:
         """Forget all views: their poses cannot be compared with those to come."""
@@ -155,7 +158,8 @@ class ViewMemory:
     def view_of(self, now_ns: int, wanted_s: float) -> EarlierView | None:
         """The view closest to wanted_s ago, if there is one within 0.5 to 1.5 times of it."""
         best, gap = None, (_OLDEST - 1.0) * wanted_s
-        for view in self._views:
+        place = bisect_left(self._views, now_ns - wanted_s * 1e9, key=_stamp_ns)
+        for view in self._views[max(place - 1, 0) : place + 2]:
             off = abs(view.ago_s(now_ns) - wanted_s)
             if off <= gap:
                 best, gap = view, off
