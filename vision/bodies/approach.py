@@ -79,7 +79,7 @@ def measure(
     """
     nothing = ApproachSpeeds(np.zeros(len(tracks)), np.full(len(tracks), np.inf), 0.0)
     before, lately = (memory.view_of(detection.captured_ns, wanted_s) for wanted_s in _LOOK_BACK_S)
-    asked = (tracks.extent_m.max(axis=1) <= LARGEST_M) & (tracks.cells >= EVEN_CELLS)
+    asked = (tracks.size_m <= LARGEST_M) & (tracks.cells >= EVEN_CELLS)
     cells = np.where(asked, tracks.cells, 0)
     if before is None or lately is None or not cells.any():
         return nothing

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from hal.compiled import compiled, inlined
 from hal.types import FloatArray, Integers, Matrix, Pose, Vector
-from vision.bodies.tracks import Tracks
+from vision.bodies.tracks import Tracks, speed_of
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import DepthGrid
 from vision.depth.rims import NO_RIM, FreeRims, free_rims
@@ -234,21 +234,40 @@ def one_way_s(so_far_s: FloatArray, rims: RimVelocities, sigmas: float, dt_s: fl
 
     Negative to the left. sigmas: so clear it has to be.
     """
-    clear = rims.sigmas > sigmas
-    way = np.sign(rims.mps)
-    before_s = np.where(np.sign(so_far_s) == way, so_far_s, 0.0)
-    return np.where(clear, before_s + way * dt_s, 0.0)
+    return _one_way_s(so_far_s, rims.mps, rims.sigmas > sigmas, dt_s)
+
+
+@compiled("float64[::1], float64[::1], boolean[::1], float64")
+def _one_way_s(so_far_s: FloatArray, mps: FloatArray, clear: NDArray[np.bool_], dt_s: float) -> FloatArray:
+    """As one_way_s. clear (T,): rims that show motion."""
+    result = np.zeros(len(mps))
+    for t in range(len(mps)):
+        if clear[t]:
+            way = np.sign(mps[t])
+            result[t] = (so_far_s[t] if np.sign(so_far_s[t]) == way else 0.0) + way * dt_s
+    return result
 
 
 def fuse(tracks: Tracks, rims: RimVelocities, dt_s: float) -> None:
     """Update both filters of the tracks with their velocities by rims. dt_s: since the frame before."""
+    use, velocity_mps, variance = _measurements(rims, tracks, dt_s)
+    tracks.update_with_surface(
+        use, velocity_mps, kalman.along_only(rims.direction.take(use, axis=0), variance)
+    )
+
+
+@compiled(RimVelocities, Tracks, "float64")
+def _measurements(
+    rims: RimVelocities, tracks: Tracks, dt_s: float
+) -> tuple[Integers, FloatArray, FloatArray]:
+    """Indices (K,) of the tracks with a velocity by rims; these velocities (K, 3), their variances (K,)."""
     use = np.isfinite(rims.sigma_mps).nonzero()[0]
-    if len(use) == 0:
-        return
-    direction = rims.direction[use]
-    # The time windows of successive frames overlap: a frame adds dt / window of a new measurement. The swing
-    # of the outline lasts as long as a step.
-    swing_mps = _GAIT * tracks.speed_mps[use] * tracks.moving[use]
-    variance = (rims.sigma_mps[use] ** 2 * rims.lag_s[use] + swing_mps**2 * _STEP_S) / dt_s
-    velocity = rims.mps[use, None] * direction
-    tracks.update_with_surface(use, velocity, kalman.along_only(direction, variance))
+    velocity_mps, variance = np.empty((len(use), 3)), np.empty(len(use))
+    for k in range(len(use)):
+        t = use[k]
+        # The time windows of successive frames overlap: a frame adds dt / window of a new measurement. The
+        # swing of the outline lasts as long as a step.
+        swing_mps = _GAIT * speed_of(tracks.state[t]) if tracks.moving[t] else 0.0
+        noise = rims.sigma_mps[t] ** 2 * rims.lag_s[t] + swing_mps**2 * _STEP_S
+        velocity_mps[k], variance[k] = rims.mps[t] * rims.direction[t], noise / dt_s
+    return use, velocity_mps, variance

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hal.compiled import compiled
+from hal.compiled import compiled, inlined
 from hal.types import Flags, FloatArray, Integers, Matrices, Matrix, Vector
 from vision.numerics import kalman
 from vision.numerics.order import indices_of
@@ -97,6 +97,11 @@ class Tracks:
     def speed_mps(self) -> FloatArray:
         """(T,) filtered speed."""
         return _speeds(self.state)
+
+    @property
+    def size_m(self) -> FloatArray:
+        """(T,) largest extent."""
+        return _largest(self.extent_m)
 
     @property
     def velocity_sigma_mps(self) -> FloatArray:
@@ -213,24 +218,28 @@ class Tracks:
 
     def update_with_fragments(self, index: Integers, velocity_mps: FloatArray, noise: FloatArray) -> None:
         """The same with velocities of fragments, which the filter of the surface does not take."""
-        state, covariance = self.state.take(index, axis=0), self.covariance.take(index, axis=0)
-        self.state[index], self.covariance[index] = kalman.update(
-            state, covariance, velocity_mps, noise, kalman.VELOCITY
+        self.state, self.covariance = kalman.update(
+            self.state, self.covariance, index, velocity_mps, noise, kalman.VELOCITY
         )
 
     def _apply(self, update: Callable[..., _Estimates], index: Integers, *measured: FloatArray | int) -> None:
         """Replace both estimates of tracks index (K,) by those that update makes of them and of measured."""
         if len(index) == 0:
             return
-        self.state[index], self.covariance[index] = update(
-            self.state.take(index, axis=0), self.covariance.take(index, axis=0), *measured
-        )
-        self.surface_state[index], self.surface_covariance[index] = update(
-            self.surface_state.take(index, axis=0), self.surface_covariance.take(index, axis=0), *measured
+        self.state, self.covariance = update(self.state, self.covariance, index, *measured)
+        self.surface_state, self.surface_covariance = update(
+            self.surface_state, self.surface_covariance, index, *measured
         )
 
 
 _COLUMNS = tuple(one.name for one in fields(Tracks) if one.name != "_next_id")
+
+
+@inlined
+def speed_of(state: FloatArray) -> float:
+    """The speed of a state (6,)."""
+    x, y, z = state[3], state[4], state[5]
+    return math.sqrt(x * x + y * y + z * z)
 
 
 @compiled("float64[:, ::1]")
@@ -238,9 +247,17 @@ def _speeds(state: FloatArray) -> FloatArray:
     """As Tracks.speed_mps."""
     speed_mps = np.empty(len(state))
     for t in range(len(state)):
-        x, y, z = state[t, 3], state[t, 4], state[t, 5]
-        speed_mps[t] = math.sqrt(x * x + y * y + z * z)
+        speed_mps[t] = speed_of(state[t])
     return speed_mps
+
+
+@compiled("float64[:, ::1]")
+def _largest(extent_m: FloatArray) -> FloatArray:
+    """As Tracks.size_m."""
+    size_m = np.empty(len(extent_m))
+    for t in range(len(extent_m)):
+        size_m[t] = max(extent_m[t, 0], extent_m[t, 1], extent_m[t, 2])
+    return size_m
 
 
 @compiled("float64[:, ::1], float64[:, ::1], float64, float64")

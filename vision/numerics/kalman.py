@@ -43,45 +43,50 @@ def predict(
 def update(
     state: FloatArray,
     covariance: FloatArray,
+    index: Integers,
     measured: FloatArray,
     noise: FloatArray,
     first: int,
 ) -> tuple[FloatArray, FloatArray]:
-    """States and covariances after a measurement of three entries of the state.
+    """States (T, 6) and covariances (T, 6, 6) after measurements of three entries of states index (K,).
 
-    measured (T, 3), noise (T, 3, 3): the measurement and its covariance. first: POSITION or VELOCITY.
+    measured (K, 3), noise (K, 3, 3): the measurements and their covariance. first: POSITION or VELOCITY.
     """
     return _updated(
-        np.ascontiguousarray(state),
-        np.ascontiguousarray(covariance),
-        np.ascontiguousarray(measured),
-        np.ascontiguousarray(noise),
-        first,
+        state, covariance, index, np.ascontiguousarray(measured), np.ascontiguousarray(noise), first
     )
 
 
+@compiled("float64[:, ::1], float64[:, :, ::1], int64[::1], float64[:, :], float64[:, :, :]")
 def reset_position(
-    state: FloatArray, covariance: FloatArray, position: FloatArray, noise: FloatArray
+    state: FloatArray, covariance: FloatArray, index: Integers, position: FloatArray, noise: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Set the positions of states (T, 6) to position (T, 3) with covariance noise (T, 3, 3).
+    """States (T, 6) and covariances (T, 6, 6) with positions (K, 3) of states index (K,), covariance noise.
 
-    The velocity stays as it is, and its covariance with the position becomes 0. This is for a centre that
-    jumps because the image border or a neighbour cuts the surface elsewhere.
+    noise: (K, 3, 3). The velocity stays as it is, and its covariance with the position becomes 0. This is for
+    a centre that jumps because the image border or a neighbour cuts the surface elsewhere.
     """
     new_state, new_covariance = state.copy(), covariance.copy()
-    new_state[:, :3] = position
-    new_covariance[:, :3, :3] = noise
-    new_covariance[:, :3, 3:] = new_covariance[:, 3:, :3] = 0.0
+    for k in range(len(index)):
+        new_state[index[k], :3], spread = position[k], new_covariance[index[k]]
+        spread[:3, :3] = noise[k]
+        spread[:3, 3:] = 0.0
+        spread[3:, :3] = 0.0
     return new_state, new_covariance
 
 
+@compiled("float64[:, ::1], float64[::1]")
 def along_only(direction: FloatArray, variance: FloatArray) -> FloatArray:
     """(K, 3, 3) covariance of velocities that are measured along one direction each, unit vectors (K, 3).
 
     variance (K,): along it, (m/s)^2.
     """
-    along = direction[:, :, None] * direction[:, None, :]
-    result: FloatArray = _UNKNOWN_MPS**2 * (np.eye(3) - along) + variance[:, None, None] * along
+    result = np.empty((len(direction), 3, 3))
+    for k in range(len(direction)):
+        for i in range(3):
+            for j in range(3):
+                along = direction[k, i] * direction[k, j]
+                result[k, i, j] = _UNKNOWN_MPS**2 * ((1.0 if i == j else 0.0) - along) + variance[k] * along
     return result
 
 
@@ -161,18 +166,26 @@ def _add_propagated(change: FloatArray, covariance: FloatArray, result: FloatArr
                 result[i, k] += between * change[k, j]
 
 
-@compiled("float64[:, ::1], float64[:, :, ::1], float64[:, ::1], float64[:, :, ::1], int64")
+@compiled(
+    "float64[:, ::1], float64[:, :, ::1], int64[::1], float64[:, ::1], float64[:, :, ::1], int64",
+)
 def _updated(
-    state: FloatArray, covariance: FloatArray, measured: FloatArray, noise: FloatArray, first: int
+    state: FloatArray,
+    covariance: FloatArray,
+    index: Integers,
+    measured: FloatArray,
+    noise: FloatArray,
+    first: int,
 ) -> tuple[FloatArray, FloatArray]:
     """As update."""
-    new_state, new_covariance = state.copy(), np.zeros_like(covariance)
+    new_state, new_covariance = state.copy(), covariance.copy()
     innovation_covariance, information = np.empty((_MEASURED, _MEASURED)), np.empty((_MEASURED, _MEASURED))
     gain, keep = np.empty((_UNKNOWNS, _MEASURED)), np.empty((_UNKNOWNS, _UNKNOWNS))
-    for t in range(len(state)):
+    for n in range(len(index)):
+        t = index[n]
         for i in range(_MEASURED):
             for j in range(_MEASURED):
-                innovation_covariance[i, j] = covariance[t, first + i, first + j] + noise[t, i, j]
+                innovation_covariance[i, j] = covariance[t, first + i, first + j] + noise[n, i, j]
         _invert(innovation_covariance, information)
         for i in range(_UNKNOWNS):
             for j in range(_UNKNOWNS):
@@ -182,8 +195,9 @@ def _updated(
                 for m in range(_MEASURED):
                     gain[i, j] += covariance[t, i, first + m] * information[m, j]
                 keep[i, first + j] -= gain[i, j]
-                new_state[t, i] += gain[i, j] * (measured[t, j] - state[t, first + j])
+                new_state[t, i] += gain[i, j] * (measured[n, j] - state[t, first + j])
         # Joseph form: stays symmetric and positive definite despite rounding.
+        new_covariance[t] = 0.0
         _add_propagated(keep, covariance[t], new_covariance[t])
-        _add_propagated(gain, noise[t], new_covariance[t])
+        _add_propagated(gain, noise[n], new_covariance[t])
     return new_state, new_covariance

@@ -6,6 +6,8 @@ import pytest
 from hal.types import FloatArray
 from vision.numerics import kalman
 
+ONE = np.zeros(1, np.intp)  # the index of the only track
+
 
 def test_prediction_by_hand() -> None:
     state = np.array([[1.0, 0.0, 4.0, 2.0, 0.0, -1.0]])
@@ -27,7 +29,7 @@ def coupled_covariance() -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
 
 def test_a_measured_position_moves_the_velocity_with_it() -> None:
     state, covariance = kalman.update(
-        np.zeros((1, 6)), coupled_covariance(), np.array([[2.0, 0.0, -4.0]]), np.eye(3)[None], 0
+        np.zeros((1, 6)), coupled_covariance(), ONE, np.array([[2.0, 0.0, -4.0]]), np.eye(3)[None], 0
     )
     # Gain 1 / (1 + 1) for the position, 0.5 / (1 + 1) for the velocity.
     np.testing.assert_allclose(state, [[1.0, 0.0, -2.0, 0.5, 0.0, -1.0]])
@@ -38,7 +40,7 @@ def test_a_measured_position_moves_the_velocity_with_it() -> None:
 
 def test_a_measured_velocity_moves_the_position_with_it() -> None:
     state, _ = kalman.update(
-        np.zeros((1, 6)), coupled_covariance(), np.array([[1.0, 0.0, 0.0]]), 3.0 * np.eye(3)[None], 3
+        np.zeros((1, 6)), coupled_covariance(), ONE, np.array([[1.0, 0.0, 0.0]]), 3.0 * np.eye(3)[None], 3
     )
     np.testing.assert_allclose(state, [[0.125, 0.0, 0.0, 0.25, 0.0, 0.0]])
 
@@ -47,7 +49,7 @@ def test_putting_a_track_elsewhere_says_nothing_about_its_velocity() -> None:
     before = np.array([[1.0, 2.0, 3.0, 0.4, 0.5, 0.6]])
     noise = 0.2 * np.eye(3)[None]
     state, covariance = kalman.reset_position(
-        before, coupled_covariance(), np.array([[2.0, 0.0, 5.0]]), noise
+        before, coupled_covariance(), ONE, np.array([[2.0, 0.0, 5.0]]), noise
     )
     np.testing.assert_allclose(state, [[2.0, 0.0, 5.0, 0.4, 0.5, 0.6]])
     np.testing.assert_allclose(covariance[0], np.diag([0.2] * 3 + [1.0] * 3))
@@ -61,7 +63,7 @@ def test_many_measurements_of_a_steady_walk_find_its_speed() -> None:
     for k in range(1, 31):
         state, covariance = kalman.predict(state, covariance, 0.1, 0.3)
         where = np.array([[0.08 * k, 0.0, 5.0 - 0.05 * k]])
-        state, covariance = kalman.update(state, covariance, where, noise, 0)
+        state, covariance = kalman.update(state, covariance, ONE, where, noise, 0)
     np.testing.assert_allclose(state[0, 3:], [0.8, 0.0, -0.5], atol=1e-3)
     assert (np.linalg.eigvalsh(covariance[0]) > 0).all()
 
@@ -134,12 +136,17 @@ def test_several_tracks_are_predicted_as_by_the_matrix_of_their_motion() -> None
 
 @pytest.mark.parametrize("first", [0, 3])
 def test_several_tracks_are_updated_as_by_the_equations_of_a_general_filter(first: int) -> None:
-    state, covariance = any_tracks(4)
+    state, covariance = any_tracks(5)
     rng = np.random.default_rng(7)
     root = rng.normal(size=(4, 3, 3))
     measured, noise = rng.normal(size=(4, 3)), root @ root.transpose(0, 2, 1) + 0.1 * np.eye(3)
-    found, spread = kalman.update(state, covariance, measured, noise, first)
+    index = np.array([4, 0, 3, 1])
+    state_after, covariance_after = kalman.update(state, covariance, index, measured, noise, first)
+    np.testing.assert_array_equal(state_after[2], state[2])
+    np.testing.assert_array_equal(covariance_after[2], covariance[2])
     select = np.eye(6)[first : first + 3]
+    state, covariance = state[index], covariance[index]
+    found, spread = state_after[index], covariance_after[index]
     for k in range(4):
         gain = covariance[k] @ select.T @ np.linalg.inv(select @ covariance[k] @ select.T + noise[k])
         np.testing.assert_allclose(found[k], state[k] + gain @ (measured[k] - select @ state[k]))
@@ -149,4 +156,7 @@ def test_several_tracks_are_updated_as_by_the_equations_of_a_general_filter(firs
 def test_no_tracks_give_nothing_to_filter() -> None:
     state, covariance = np.empty((0, 6)), np.empty((0, 6, 6))
     assert kalman.predict(state, covariance, 0.1, 0.3)[1].shape == (0, 6, 6)
-    assert kalman.update(state, covariance, np.empty((0, 3)), np.empty((0, 3, 3)), 3)[0].shape == (0, 6)
+    assert kalman.update(state, covariance, ONE[:0], np.empty((0, 3)), np.empty((0, 3, 3)), 3)[0].shape == (
+        0,
+        6,
+    )
