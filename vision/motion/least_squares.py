@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.compiled import compiled, inlined
-from hal.types import FloatArray, Matrices, Matrix
+from hal.types import FloatArray, Integers, Matrices, Matrix, Vector
 from vision.motion.velocities import EndResiduals, normal_equations
 
 _ROBUST_CHI2 = 9.0  # 99 % of ends that move with the body, 2 degrees of freedom; others lose their weight
@@ -36,11 +36,11 @@ class BodyVelocities:
     contradicts_static: share of them that contradict a static body, (G,).
     """
 
-    velocity_mps: FloatArray
-    covariance: FloatArray
-    ends: NDArray[np.intp]
-    agreement: FloatArray
-    contradicts_static: FloatArray
+    velocity_mps: Matrix
+    covariance: Matrices
+    ends: Integers
+    agreement: Vector
+    contradicts_static: Vector
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,7 +83,7 @@ def body_velocities(
     velocity_mps, covariance, agreement, contradicts_static = _bodies(
         first, members, motion, per_end, start_mps, max_speed_mps
     )
-    return BodyVelocities(velocity_mps, covariance, np.diff(first), agreement, contradicts_static)
+    return BodyVelocities(velocity_mps, covariance, first[1:] - first[:-1], agreement, contradicts_static)
 
 
 @inlined

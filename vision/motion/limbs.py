@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hal.compiled import compiled
+from hal.compiled import compiled, inlined
 from hal.types import FloatArray
 from vision.motion.least_squares import BodyVelocities
 
@@ -33,32 +33,45 @@ _ENDS_PER_LIMB = 8.0
 _GAIT = 0.6  # share of the body's speed by which one limb differs from the body over a step
 
 
+@inlined
+def _is_restless(body: BodyVelocities, g: int) -> bool:
+    result: bool = body.ends[g] >= _MANY_ENDS and body.contradicts_static[g] >= _RESTLESS
+    return result
+
+
+@compiled(BodyVelocities)
 def restless(body: BodyVelocities) -> NDArray[np.bool_]:
     """(G,) bodies most of whose ends contradict standing still, whether they agree with each other or not."""
-    result: NDArray[np.bool_] = (body.ends >= _MANY_ENDS) & (body.contradicts_static >= _RESTLESS)
+    result = np.empty(len(body.ends), np.bool_)
+    for g in range(len(body.ends)):
+        result[g] = _is_restless(body, g)
     return result
 
 
+@compiled(BodyVelocities)
 def believable(body: BodyVelocities) -> NDArray[np.bool_]:
     """(G,) bodies whose velocity by their fragments can be believed."""
-    agreeing = body.agreement * body.ends
-    alike = (agreeing >= _FEW_ENDS) & ((body.agreement >= _MIN_AGREEMENT) | (agreeing >= _SOME_ENDS))
-    result: NDArray[np.bool_] = alike | restless(body)
+    result = np.empty(len(body.ends), np.bool_)
+    for g in range(len(body.ends)):
+        agreeing = body.agreement[g] * body.ends[g]
+        alike = body.agreement[g] >= _MIN_AGREEMENT or agreeing >= _SOME_ENDS
+        result[g] = (agreeing >= _FEW_ENDS and alike) or _is_restless(body, g)
     return result
 
 
+@compiled(BodyVelocities, "float64[::1]")
 def variance(body: BodyVelocities, speed_mps: FloatArray) -> FloatArray:
     """(G,) variance per axis (m^2/s^2) of the difference between the fragments' velocity and the body's.
 
     speed_mps (G,): of bodies that are known to move, 0 for others: a static body does not swing its limbs.
     """
-    agreeing = np.maximum(body.agreement * body.ends, 1.0)
-    # If some ends are static, the others are not limbs of a body that moves.
-    limbs = np.where(restless(body), np.maximum(body.ends / _ENDS_PER_LIMB, 1.0), 1.0)
-    result: FloatArray = (
-        np.square(_DISAGREEMENT_MPS * (1.0 - body.agreement)) / limbs
-        + np.square(_GAIT * speed_mps) / agreeing
-    )
+    result = np.empty(len(speed_mps))
+    for g in range(len(speed_mps)):
+        agreeing = max(body.agreement[g] * body.ends[g], 1.0)
+        # If some ends are static, the others are not limbs of a body that moves.
+        limbs = max(body.ends[g] / _ENDS_PER_LIMB, 1.0) if _is_restless(body, g) else 1.0
+        disagreement_mps, swing_mps = _DISAGREEMENT_MPS * (1.0 - body.agreement[g]), _GAIT * speed_mps[g]
+        result[g] = disagreement_mps * disagreement_mps / limbs + swing_mps * swing_mps / agreeing
     return result
 
 

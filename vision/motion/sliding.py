@@ -12,6 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from hal.compiled import compiled
 from hal.types import FloatArray
 from vision.motion.least_squares import BodyVelocities
 
@@ -19,6 +20,7 @@ _MANY_ENDS = 8  # four fragments, as for a proof of motion along the line of sig
 _SLIDING_MPS = 3.0  # an end slides about as fast as its body and the robot move
 
 
+@compiled(BodyVelocities, "boolean[:], int64[::1], float64[:, :]")
 def variance(
     body: BodyVelocities, cut: NDArray[np.bool_], use: NDArray[np.intp], sight: FloatArray
 ) -> FloatArray:
@@ -26,9 +28,11 @@ def variance(
 
     cut (T,): tracks that the left or right border of the image cuts. sight (T, 3): unit vectors to them.
     """
-    unsure = cut[use] & (body.agreement[use] * body.ends[use] < _MANY_ENDS)
-    along = sight[use]
-    result: FloatArray = np.where(unsure, _SLIDING_MPS**2, 0.0)[:, None, None] * (
-        along[:, :, None] * along[:, None, :]
-    )
+    result = np.zeros((len(use), 3, 3))
+    for k in range(len(use)):
+        t = use[k]
+        if cut[t] and body.agreement[t] * body.ends[t] < _MANY_ENDS:
+            for i in range(3):
+                for j in range(3):
+                    result[k, i, j] = _SLIDING_MPS**2 * (sight[t, i] * sight[t, j])
     return result
