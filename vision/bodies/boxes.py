@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hal.compiled import compiled
+from hal.compiled import compiled, inlined
 from hal.types import FloatArray
 from vision.bodies.sizes import NEARER_INVERSE, SEEN_THROUGH_HEIGHT, SEEN_THROUGH_SHARE
 from vision.depth.cells import cell_at
@@ -61,28 +61,40 @@ def relations(regions: Regions, one: NDArray[np.intp], other: NDArray[np.intp]) 
     return Relations(*_relations(regions, one, other))
 
 
+@inlined
+def gap_between_m(regions: Regions, one: int, other: int) -> float:
+    """Distance in space between two regions, 0 where they touch."""
+    squared = 0.0
+    for i in range(3):
+        apart_m = abs(regions.position_m[one, i] - regions.position_m[other, i])
+        apart_m -= 0.5 * (regions.extent_m[one, i] + regions.extent_m[other, i])
+        squared += max(apart_m, 0.0) ** 2
+    return math.sqrt(squared)
+
+
+@inlined
+def lies(regions: Regions, one: int, other: int) -> tuple[float, bool, bool]:
+    """How a region lies relative to another one in the image: overlap, stacked and within of Relations."""
+    left, top, right, bottom = regions.bbox_px[one]
+    u0, v0, u1, v1 = regions.bbox_px[other]
+    width, height = right - left, bottom - top
+    across, down = min(right, u1) - max(left, u0), min(bottom, v1) - max(top, v0)
+    overlap = max(across, 0.0) * max(down, 0.0) / max(width * height, 1.0)
+    stacked = across >= _STACKED_SHARE * width and abs(bottom - v0) <= _TOUCHING_PX
+    within = height <= SEEN_THROUGH_HEIGHT * (v1 - v0) and overlap >= SEEN_THROUGH_SHARE
+    return overlap, stacked, within
+
+
 @compiled(Regions, "int64[:], int64[:]")
 def _relations(
     regions: Regions, one: NDArray[np.intp], other: NDArray[np.intp]
 ) -> tuple[FloatArray, FloatArray, NDArray[np.bool_], NDArray[np.bool_]]:
     """The fields of Relations."""
-    position_m, extent_m, bbox_px = regions.position_m, regions.extent_m, regions.bbox_px
     gap_m, overlap = np.empty(len(one)), np.empty(len(one))
     stacked, within = np.empty(len(one), np.bool_), np.empty(len(one), np.bool_)
     for k in range(len(one)):
-        a, b = one[k], other[k]
-        squared = 0.0
-        for i in range(3):
-            apart_m = abs(position_m[a, i] - position_m[b, i]) - 0.5 * (extent_m[a, i] + extent_m[b, i])
-            squared += max(apart_m, 0.0) ** 2
-        gap_m[k] = math.sqrt(squared)
-        left, top, right, bottom = bbox_px[a, 0], bbox_px[a, 1], bbox_px[a, 2], bbox_px[a, 3]
-        u0, v0, u1, v1 = bbox_px[b, 0], bbox_px[b, 1], bbox_px[b, 2], bbox_px[b, 3]
-        width, height = right - left, bottom - top
-        across, down = min(right, u1) - max(left, u0), min(bottom, v1) - max(top, v0)
-        overlap[k] = max(across, 0.0) * max(down, 0.0) / max(width * height, 1.0)
-        stacked[k] = across >= _STACKED_SHARE * width and abs(bottom - v0) <= _TOUCHING_PX
-        within[k] = height <= SEEN_THROUGH_HEIGHT * (v1 - v0) and overlap[k] >= SEEN_THROUGH_SHARE
+        gap_m[k] = gap_between_m(regions, one[k], other[k])
+        overlap[k], stacked[k], within[k] = lies(regions, one[k], other[k])
     return gap_m, overlap, stacked, within
 
 

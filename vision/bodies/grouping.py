@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import DepthNoise
-from hal.compiled import compiled
+from hal.compiled import compiled, inlined
 from hal.types import FloatArray, Matrix, Pose, Vector
-from vision.bodies.boxes import nearer_between, relations
+from vision.bodies.boxes import gap_between_m, lies, nearer_between
 from vision.bodies.tracks import Tracks
 from vision.depth.depth_grid import DepthGrid
 from vision.depth.depth_noise import depth_sigma_of
@@ -131,6 +131,22 @@ def _within_expected_box(
     return result, main
 
 
+@inlined
+def _main_part(winner: NDArray[np.int32], votes: NDArray[np.intp], part: int) -> int:
+    """Main part of a part's winner: of the parts with that winner the first with the most votes.
+
+    A part without a winner is its own main part.
+    """
+    if winner[part] == 0:
+        return part
+    main = -1
+    for other in range(len(winner)):
+        if winner[other] == winner[part] and (main < 0 or votes[other] > votes[main]):
+            main = other
+    return main
+
+
+@compiled("int32[::1]", Regions, "int64[:], boolean[:, :]")
 def detach(
     winner: NDArray[np.int32], parts: Regions, votes: NDArray[np.intp], expected: NDArray[np.bool_]
 ) -> NDArray[np.int32]:
@@ -139,39 +155,21 @@ def detach(
     A part stays all the same if it is expected (P, T), or if it stands on the main part in the image, or is
     seen through it, and most of its cells voted for the track. votes (P,): of the winner.
     """
-    main = _main_parts(winner, votes)
-    beside = (main != np.arange(len(main))).nonzero()[0]
-    if len(beside) == 0:
-        return winner
-    relation = relations(parts, beside, main[beside])
-    carried = ((relation.gap_m <= _LOAD_GAP_M) & relation.stacked) | (
-        (relation.gap_m <= _SEEN_THROUGH_GAP_M) & relation.within
-    )
-    carried &= votes[beside] >= _OWN_VOTE_SHARE * parts.cells[beside]
-    far = (relation.gap_m > _APART_M) & ~expected[beside, winner[beside] - 1] & ~carried
     result = winner.copy()
-    result[beside[far]] = 0
+    for p in range(len(winner)):
+        main = _main_part(winner, votes, p)
+        if main == p or expected[p, winner[p] - 1]:
+            continue
+        gap_m = gap_between_m(parts, p, main)
+        _, stacked, within = lies(parts, p, main)
+        carried = (gap_m <= _LOAD_GAP_M and stacked) or (gap_m <= _SEEN_THROUGH_GAP_M and within)
+        carried = carried and votes[p] >= _OWN_VOTE_SHARE * parts.cells[p]
+        if gap_m > _APART_M and not carried:
+            result[p] = 0
     return result
 
 
-@compiled("int32[::1], int64[:]")
-def _main_parts(winner: NDArray[np.int32], votes: NDArray[np.intp]) -> NDArray[np.intp]:
-    """(P,) main part of each part's winner: of the parts with that winner the first with the most votes.
-
-    A part without a winner is its own main part.
-    """
-    parts = len(winner)
-    main = np.arange(parts)
-    for p in range(parts):
-        for other in range(parts):
-            same = winner[p] > 0 and winner[other] == winner[p]
-            if same and (
-                votes[other] > votes[main[p]] or (votes[other] == votes[main[p]] and other < main[p])
-            ):
-                main[p] = other
-    return main
-
-
+@compiled("int64[::1]", Regions, "int32[::1], boolean[:], boolean[:, :]")
 def attach(
     new_parts: NDArray[np.intp],
     parts: Regions,
@@ -184,17 +182,14 @@ def attach(
     A part that is expected (P, T) at a track counts as touching it. new_parts: indices. alive (T,): tracks
     that may get parts, which are those that move or have moved.
     """
-    if len(new_parts) == 0 or not alive.any():
-        return winner
-    of_mover = ((winner > 0) & np.concatenate(([False], alive))[winner]).nonzero()[0]
-    if len(of_mover) == 0:
-        return winner
-    a, b = new_parts.repeat(len(of_mover)), np.tile(of_mover, len(new_parts))
-    gap_m = relations(parts, a, b).gap_m
-    gap_m[expected[a, winner[b] - 1]] = 0.0
-    gap_m[parts.cells[a] > _SMALL_SHARE * parts.cells[b]] = np.inf
-    gap_m = gap_m.reshape(len(new_parts), -1)
-    nearest, close = of_mover[gap_m.argmin(axis=1)], gap_m.min(axis=1) <= _CLOSE_M
     result = winner.copy()
-    result[new_parts[close]] = winner[nearest[close]]
+    for part in new_parts:
+        closest_m = np.inf
+        for other in range(len(winner)):
+            track = winner[other] - 1
+            if track < 0 or not alive[track] or parts.cells[part] > _SMALL_SHARE * parts.cells[other]:
+                continue
+            gap_m = 0.0 if expected[part, track] else gap_between_m(parts, part, other)
+            if gap_m <= _CLOSE_M and gap_m < closest_m:
+                closest_m, result[part] = gap_m, winner[other]
     return result
