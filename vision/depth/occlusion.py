@@ -73,41 +73,49 @@ def _hidden_cells(
     room = max(count, labels.max()) + 1
     hidden, overlapped = np.zeros(room, np.intp), np.zeros(room, np.intp)
     for i in range(labels.shape[0]):
-        neighbour = -1  # column of the last cell in this row that belongs to a part
-        for j in range(labels.shape[1]):
+        before, neighbour = labels[i, 0], -1  # neighbour: the last cell in this row that belongs to a part
+        for j in range(1, labels.shape[1]):
             here = labels[i, j]
-            if j > 0 and labels[i, j - 1] != here:
-                beside, step = labels[i, j - 1], inverse[i, j] - inverse[i, j - 1]
-                if abs(step) > jump:
-                    hidden[beside if step > 0 else here] += 1
-                elif beside > 0 and here > 0:
-                    hidden[beside] += 1
-                    hidden[here] += 1
-            if here == 0:
+            if here == before:
                 continue
-            if neighbour >= 0 and labels[i, neighbour] != here and j - neighbour <= _GAP_CELLS + 1:
-                step = inverse[i, j] - inverse[i, neighbour]
-                if abs(step) > jump:
-                    overlapped[labels[i, neighbour] if step > 0 else here] += 1
-            neighbour = j
+            step = inverse[i, j] - inverse[i, j - 1]
+            if abs(step) > jump:
+                hidden[before if step > 0 else here] += 1
+            elif before > 0 and here > 0:
+                hidden[before] += 1
+                hidden[here] += 1
+            neighbour = j - 1 if before > 0 else neighbour
+            before = here
+            if here == 0 or neighbour < 0 or j - neighbour > _GAP_CELLS + 1:
+                continue
+            step, beside = inverse[i, j] - inverse[i, neighbour], labels[i, neighbour]
+            if beside != here and abs(step) > jump:
+                overlapped[beside if step > 0 else here] += 1
     return hidden[1 : count + 1].copy(), overlapped[1 : count + 1].copy()
 
 
+@compiled(DepthGrid, "int32[:, ::1]", Regions)
 def hidden_below(grid: DepthGrid, labels: IntGrid, regions: Regions) -> Flags:
     """(R,) parts of at least _HEAD_M height whose lower end is hidden over at least half of their width.
 
     How far down they reach is not known. Below the lower end of a beam, in contrast, something farther is
     seen.
     """
-    inverse, flat = grid.inverse_depth.ravel(), labels.ravel()
-    width = labels.shape[1]
-    rims = ((flat[:-width] > 0) & (flat[:-width] != flat[width:])).nonzero()[0]
-    below = np.zeros(len(rims), inverse.dtype)
-    for step in range(1, _GAP_CELLS + 1):
-        below = np.maximum(below, inverse.take(np.minimum(rims + step * width, len(flat) - 1)))
-    nearer = below - inverse.take(rims) > np.float32(MAX_JUMP)
-    cells = np.bincount(flat.take(rims[nearer]), minlength=len(regions.cells) + 1)[1:]
-    across = (regions.bbox_px[:, 2] - regions.bbox_px[:, 0]) / grid.step_px
-    tall = regions.extent_m[:, 1] >= _HEAD_M
-    result: Flags = tall & (regions.cells > 0) & (cells >= _HIDDEN_SHARE * across)
+    inverse, hidden = grid.inverse_depth, np.zeros(len(regions.cells) + 1, np.intp)
+    height, width = labels.shape
+    for i in range(height - 1):
+        for j in range(width):
+            label = labels[i, j]
+            if label == 0 or labels[i + 1, j] == label:
+                continue
+            nearest = np.float32(0.0)
+            for k in range(i + 1, i + 1 + _GAP_CELLS):
+                # Beyond the last row the last cell of all counts.
+                nearest = max(nearest, inverse[k, j] if k < height else inverse[height - 1, width - 1])
+            hidden[label] += nearest - inverse[i, j] > np.float32(MAX_JUMP)
+    result = np.zeros(len(regions.cells), np.bool_)
+    for part in range(len(regions.cells)):
+        across = (regions.bbox_px[part, 2] - regions.bbox_px[part, 0]) / grid.step_px
+        tall = regions.extent_m[part, 1] >= _HEAD_M
+        result[part] = tall and regions.cells[part] > 0 and hidden[part + 1] >= _HIDDEN_SHARE * across
     return result
