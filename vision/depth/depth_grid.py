@@ -7,7 +7,7 @@ of pixels, smoothed by a median over 5x5 cells.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Annotated, TypeVar
 
@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from config.perception import DepthNoise, PerceptionConfig
+from config.perception import PerceptionConfig
 from hal.compiled import compiled, inlined
 from hal.types import CameraMount, DepthImage, FloatArray, Intrinsics, RgbdFrame
 from vision.depth.depth_mask import measurable_m
@@ -117,7 +117,17 @@ def make_grid(frame: RgbdFrame, config: PerceptionConfig, mount: CameraMount | N
     middle = np.asarray(cv2.medianBlur(raw, 5), np.uint16)
     inverse, depth_m = _smoothed(raw, middle, scale_m)
     rays = _directions(frame.intrinsics, mount, depth_m.shape, step, offset)
-    grid = DepthGrid(
+    forward_m, height_m, height_sigma_m = depth_m, None, None
+    if mount is not None:
+        forward_m, height_m, height_sigma_m = _over_floor(
+            depth_m,
+            rays.ahead,
+            rays.drop,
+            np.float32(mount.height_m),
+            np.float32(config.depth_noise.floor_m),
+            np.float32(config.depth_noise.quadratic_per_m),
+        )
+    return DepthGrid(
         step_px=step,
         offset_px=offset,
         depth_m=depth_m,
@@ -126,35 +136,13 @@ def make_grid(frame: RgbdFrame, config: PerceptionConfig, mount: CameraMount | N
         beyond=beyond,
         x=rays.x,
         y=rays.y,
-        forward_m=depth_m,
-        height_m=None,
-        height_sigma_m=None,
-        camera_height_m=math.nan,
-        pitch_rad=math.nan,
-        up=None,
-        range_m=range_m,
-    )
-    return grid if mount is None else _with_floor(grid, rays, mount, config.depth_noise)
-
-
-def _with_floor(grid: DepthGrid, rays: _Directions, mount: CameraMount, noise: DepthNoise) -> DepthGrid:
-    """grid with its distances along the floor and its heights over it."""
-    forward_m, height_m, height_sigma_m = _over_floor(
-        grid.depth_m,
-        rays.ahead,
-        rays.drop,
-        np.float32(mount.height_m),
-        np.float32(noise.floor_m),
-        np.float32(noise.quadratic_per_m),
-    )
-    return replace(
-        grid,
         forward_m=forward_m,
         height_m=height_m,
         height_sigma_m=height_sigma_m,
-        camera_height_m=mount.height_m,
-        pitch_rad=mount.pitch_rad,
-        up=np.array([0.0, -math.cos(mount.pitch_rad), -math.sin(mount.pitch_rad)]),
+        camera_height_m=math.nan if mount is None else mount.height_m,
+        pitch_rad=math.nan if mount is None else mount.pitch_rad,
+        up=rays.up,
+        range_m=range_m,
     )
 
 
@@ -165,12 +153,14 @@ class _Directions:
     x, y: as in DepthGrid, (w,) and (h,).
     ahead: metres along the floor, (h,).
     drop: metres down, (h,).
+    up: the floor's normal in optical axes, (3,); None where the floor is not known.
     """
 
     x: FloatGrid
     y: FloatGrid
     ahead: FloatGrid
     drop: FloatGrid
+    up: FloatArray | None
 
 
 @lru_cache(maxsize=4)
@@ -182,7 +172,8 @@ def _directions(
     v = (offset + step * np.arange(shape[0])).astype(np.float32)
     x = (u - np.float32(camera.cx)) / np.float32(camera.fx)
     y = (v - np.float32(camera.cy)) / np.float32(camera.fy)
-    rays = _Directions(x, y, *floor_ray(y, 0.0 if mount is None else mount.pitch_rad))
+    up = None if mount is None else np.array([0.0, -math.cos(mount.pitch_rad), -math.sin(mount.pitch_rad)])
+    rays = _Directions(x, y, *floor_ray(y, 0.0 if mount is None else mount.pitch_rad), up)
     for values in (rays.x, rays.y, rays.ahead, rays.drop):
         values.setflags(write=False)
     return rays
