@@ -197,15 +197,22 @@ def _proofs(
     return moves, strength, surely_static, over, goes_on
 
 
-def prove(seen: MotionEvidence, moving: BoolArray, dt_s: float, settings: MotionSettings) -> Proof:
-    """The proofs of this frame. moving (T,): last verdict."""
-    velocity, covariance = np.empty((4, len(moving), 3)), np.empty((4, len(moving), 3, 3))
+@compiled(MotionEvidence)
+def _velocities(seen: MotionEvidence) -> tuple[FloatArray, FloatArray]:
+    """The four velocities of T tracks (4, T, 3) with their covariances (4, T, 3, 3)."""
+    count = len(seen.velocity)
+    velocity, covariance = np.empty((4, count, 3)), np.empty((4, count, 3, 3))
     velocity[_FILTERED], covariance[_FILTERED] = seen.velocity, seen.covariance
     velocity[_FRAME], covariance[_FRAME] = seen.own_velocity, seen.own_covariance
     velocity[_SURFACE], covariance[_SURFACE] = seen.surface_velocity, seen.surface_covariance
     velocity[_APART] = seen.velocity - seen.surface_velocity
     covariance[_APART] = seen.covariance + seen.surface_covariance
-    parts = decompose(velocity, covariance, seen.sight, seen.up)
+    return velocity, covariance
+
+
+def prove(seen: MotionEvidence, moving: BoolArray, dt_s: float, settings: MotionSettings) -> Proof:
+    """The proofs of this frame. moving (T,): last verdict."""
+    parts = decompose(*_velocities(seen), seen.sight, seen.up)
     second = second_opinion(parts, _FILTERED, _SURFACE, _APART)
     alone_mps = 0.0 if seen.reckoned else _ALONE_MPS
     least_mps = settings.min_speed_mps + alone_mps + _SPEED_PER_METRE * seen.distance_m

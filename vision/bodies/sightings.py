@@ -92,10 +92,19 @@ def forget_implausible(tracks: Tracks, settings: MotionSettings) -> None:
         (tracks.state, tracks.covariance),
         (tracks.surface_state, tracks.surface_covariance),
     ):
-        implausible = np.square(state[:, 3:]).sum(axis=1) > settings.implausible_mps**2
-        wild = (implausible & ~tracks.moving).nonzero()[0]
+        wild = _wild(state, tracks.moving, settings.implausible_mps)
         if len(wild):
             kalman.forget_velocity(state, covariance, wild, settings.max_speed_mps)
+
+
+@compiled("float64[:, ::1], boolean[::1], float64")
+def _wild(state: FloatArray, moving: NDArray[np.bool_], most_mps: float) -> Integers:
+    """(K,) indices of the states (T, 6) that are faster than most_mps, and not known to be moving (T,)."""
+    wild = np.empty(len(state), np.bool_)
+    for t in range(len(state)):
+        x, y, z = state[t, 3], state[t, 4], state[t, 5]
+        wild[t] = x * x + y * y + z * z > most_mps**2 and not moving[t]
+    return wild.nonzero()[0]
 
 
 def _note_view(tracks: Tracks, detection: Detection, measured: Regions, kind: NDArray[np.intp]) -> None:

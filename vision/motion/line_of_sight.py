@@ -162,15 +162,24 @@ class SecondOpinion(NamedTuple):
     confirms_across: Flags
 
 
+@compiled(Split, "int64, int64, int64")
 def second_opinion(parts: Split, fragments: int, surface: int, apart: int) -> SecondOpinion:
     """Compare two of the K velocities: fragments and surface. apart is their difference."""
-    denied, least = _CONTRADICTION_SIGMAS**2, CONFIRMING_SIGMAS**2
-    denies_along = np.square(parts.value[apart]) > denied * parts.variance[apart]
-    same_way = parts.value[surface] * parts.value[fragments] > 0
-    same_side = (parts.rest[fragments] * parts.rest[surface]).sum(axis=1) > 0
-    return SecondOpinion(
-        denies_along=denies_along,
-        denies_across=parts.across[apart] > denied,
-        confirms_along=(parts.along[surface] > least) & same_way & ~denies_along,
-        confirms_across=(parts.across[surface] > least) & same_side,
+    count = parts.value.shape[1]
+    result = SecondOpinion(
+        denies_along=np.empty(count, np.bool_),
+        denies_across=np.empty(count, np.bool_),
+        confirms_along=np.empty(count, np.bool_),
+        confirms_across=np.empty(count, np.bool_),
     )
+    denied, least = _CONTRADICTION_SIGMAS**2, CONFIRMING_SIGMAS**2
+    for t in range(count):
+        side = 0.0
+        for i in range(_AXES):
+            side += parts.rest[fragments, t, i] * parts.rest[surface, t, i]
+        same_way = parts.value[surface, t] * parts.value[fragments, t] > 0.0
+        denies_along = parts.value[apart, t] * parts.value[apart, t] > denied * parts.variance[apart, t]
+        result.denies_along[t], result.denies_across[t] = denies_along, parts.across[apart, t] > denied
+        result.confirms_along[t] = parts.along[surface, t] > least and same_way and not denies_along
+        result.confirms_across[t] = parts.across[surface, t] > least and side > 0.0
+    return result
