@@ -1,7 +1,8 @@
 """Dataclasses that are quick to make: frozen for the type checker, but not at run time.
 
 A frozen dataclass sets each field with a function call, which takes three times as long as an assignment.
-For records that are made in every control step, that was 5 % of the time of a simulated mission.
+For records that are made in every control step, that was 5 % of the time of a simulated mission; for those
+that are made in every frame, 1 % of the time of perception.
 """
 
 from __future__ import annotations

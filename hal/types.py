@@ -79,7 +79,7 @@ class RgbdFrame:
     gyro: GyroSamples | None = None
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class Pose:
     """Pose of an inner frame in an outer one: p_outer = rotation @ p_inner + translation_m.
 

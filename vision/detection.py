@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hal.records import record
 from hal.types import FloatArray, Integers, Intrinsics, Pose
 from vision.depth.depth_grid import DepthGrid
 from vision.ego_motion.camera_motion import MIN_AGREEMENT, CameraEstimate
@@ -17,7 +17,7 @@ from vision.motion.velocities import EndResiduals
 from vision.scene import CameraHealth, EgoMotion, SeenFloor
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class CameraMotion:
     """The camera's motion since the frame before, and what is to be thought of it.
 
@@ -49,7 +49,7 @@ NOT_COMPARED = CameraMotion(
 )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class Detection:
     """What detect finds in one frame, with N fragments, before anything is called an obstacle.
 

@@ -8,7 +8,7 @@ and the camera's health is checked. track (vision/tracker.py) takes the Detectio
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from config.own_parts import OwnPart
 from config.perception import PerceptionConfig
+from hal.records import record
 from hal.types import CameraMount, FloatArray, Pose, RgbdFrame
 from vision.camera.gyro import GyroMemory
 from vision.camera.health import Continuity, FrameCheck, HealthMonitor, with_ego_motion
@@ -49,7 +50,7 @@ _NO_SWEEP = np.zeros(2)
 _TURN_S = 1.0 / 30.0
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class _Now:
     """A frame, and what is known of it before anything is tracked in it.
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from hal.records import record
 from vision.fragments.attention import NeedsFragments
 from vision.scene import Fragments, Scene
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class Percept:
     """scene, fragments: of one frame. needs_fragments: bodies on which the next frame looks for more."""
 

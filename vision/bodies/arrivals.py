@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left
-from dataclasses import dataclass
 from operator import attrgetter
 
 import cv2
@@ -21,6 +20,7 @@ from numpy.typing import NDArray
 
 from config.perception import DepthNoise
 from hal.compiled import compiled, inlined
+from hal.records import record
 from hal.types import FloatArray, Pose
 from vision.depth.cells import lattice_of, place_of
 from vision.depth.connected import IntGrid
@@ -59,7 +59,7 @@ def arriving(arrived: NDArray[np.intp], cells: NDArray[np.intp]) -> NDArray[np.b
     return result
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class EarlierView:
     """What was seen a moment ago.
 
@@ -78,7 +78,7 @@ class EarlierView:
         return (now_ns - self.stamp_ns) * 1e-9
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class Changes:
     """Cells whose surface has arrived, and cells whose surface has stayed.
 

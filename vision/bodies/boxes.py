@@ -7,12 +7,12 @@ Used by vision/bodies/grouping.py, merging.py and report.py. Terms: vision/__ini
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hal.compiled import compiled, inlined
+from hal.records import record
 from hal.types import FloatArray
 from vision.bodies.sizes import NEARER_INVERSE, SEEN_THROUGH_HEIGHT, SEEN_THROUGH_SHARE
 from vision.depth.cells import cell_at
@@ -25,7 +25,7 @@ _STACKED_SHARE = 0.7  # of a load's width is above its carrier at least; the res
 _TOUCHING_PX = 16.0  # two edges in the image touch: 4 cells, since the rims at a jump in depth are of neither
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class Boxes:
     """Axis-parallel boxes of R surfaces in the camera frame: low_m (R, 3), high_m (R, 3)."""
 
@@ -39,7 +39,7 @@ def boxes(regions: Regions) -> Boxes:
     return Boxes(regions.position_m - half, regions.position_m + half)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class Relations:
     """How each of K boxes lies relative to one other box, (K,) each.
 

@@ -7,10 +7,9 @@ measures always belong together. Terms: vision/__init__.py.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from hal.records import record
 from hal.types import Integers
 from vision.bodies.births import FIRST_SIGMA_M
 from vision.bodies.tracks import Tracks
@@ -20,7 +19,7 @@ from vision.depth.regions import Regions
 from vision.detection import Detection
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class Cut:
     """Cells that are cut out of a track, or of several that they connect.
 

@@ -13,13 +13,12 @@ joined later, by vision/bodies/merging.py. Terms: vision/__init__.py.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import DepthNoise
 from hal.compiled import compiled, inlined
+from hal.records import record
 from hal.types import FloatArray, Matrix, Pose, Vector
 from vision.bodies.boxes import gap_between_m, lies, nearer_between
 from vision.bodies.tracks import Tracks
@@ -38,7 +37,7 @@ _SMALL_SHARE = 0.5  # of the larger part's cells: a new part with more is a body
 _OWN_VOTE_SHARE = 0.7
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class ExpectedBodies:
     """Where T bodies are expected, in the camera frame.
 

@@ -38,13 +38,13 @@ Hysteresis: evidence is a track's score. A track becomes moving at 1 and static 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import MotionSettings
 from hal.compiled import compiled
+from hal.records import record
 from hal.types import FloatArray
 from vision.bodies.motion_evidence import MotionEvidence
 from vision.bodies.proof import Proof, prove
@@ -64,7 +64,7 @@ _MAX_EVIDENCE = 1.5  # 1.5 times what a verdict needs, so that no mover is held 
 _SURE_SQUARED_SIGMAS = 30.0  # 5.5 sigmas give a confidence of 0.63; the weakest proof gives 0.4
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class Verdict:
     """Of T tracks, (T,) each.
 

@@ -8,13 +8,13 @@ projected point. The predicted cells then vote to which track each part belongs 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hal.compiled import compiled
+from hal.records import record
 from hal.types import FloatArray, Pose
 from vision.depth.cells import lattice_of, place_of
 from vision.depth.connected import IntGrid
@@ -28,7 +28,7 @@ _DEPTH_GATE_INVERSE = 0.03
 _DEPTH_GATE_M = 0.25
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class TrackSurfaces:
     """The surfaces of T tracks in one frame, as K points.
 

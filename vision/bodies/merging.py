@@ -6,11 +6,10 @@ vision/bodies/regrouping.py, before division. Terms: vision/__init__.py.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from hal.records import record
 from hal.types import FloatArray
 from vision.bodies.boxes import boxes, farther_between, nearer_between, relations
 from vision.bodies.division import second_body
@@ -42,7 +41,7 @@ _COMPATIBLE_SIGMAS = 2.0  # more difference for noise: a shank that stands, or s
 _MIN_MOVING_MPS = 0.3  # a slower track moves like anything static
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class _Pairs:
     """K pairs of a smaller and a larger track, (K,) each.
 

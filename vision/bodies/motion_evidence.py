@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import DepthNoise
 from hal.compiled import compiled
+from hal.records import record
 from hal.types import Flags, FloatArray, Integers, Matrices, Matrix, Vector
 from vision.bodies.approach import ApproachSpeeds
 from vision.bodies.rim_motion import RimVelocities
@@ -27,7 +27,7 @@ _AGREED = 0.65
 _MIN_BORNE_OUT = 0.2
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class FrameMeasures:
     """What one frame measures of T tracks.
 
@@ -44,7 +44,7 @@ class FrameMeasures:
     keeps_area: Flags
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class MotionEvidence:
     """Evidence of T tracks, (T, ...) each unless stated; vectors along the axes of the fixed frame.
 

@@ -5,13 +5,12 @@ The rules are in vision/bodies/proof_rules.py; vision/bodies/judgement.py adds t
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import MotionSettings
 from hal.compiled import compiled, inlined
+from hal.records import record
 from hal.types import Flags, FloatArray, Vector
 from vision.bodies.motion_evidence import MotionEvidence
 from vision.bodies.proof_rules import (
@@ -48,7 +47,7 @@ _WANDER = 0.5  # of its size: as the view turns from front to side, the centre m
 _FILTERED, _FRAME, _SURFACE, _APART = range(4)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class Proof:
     """Of T tracks, (T,) each.
 
@@ -67,7 +66,7 @@ class Proof:
     squared_sigmas: Vector
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class _Demands:
     """What is asked of the proofs of T tracks; see Demand.
 

@@ -11,13 +11,13 @@ vision/tracker.py calls it after the centres have been measured (vision/bodies/s
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hal.compiled import compiled, inlined
+from hal.records import record
 from hal.types import FloatArray, Integers, Matrix, Pose, Vector
 from vision.bodies.tracks import Tracks, speed_of
 from vision.depth.connected import IntGrid
@@ -63,7 +63,7 @@ class RimVelocities(NamedTuple):
         return result
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class _SeenRims:
     """The free rims of the tracks track_id (T,) as seen from pose, the camera's, at stamp_ns."""
 

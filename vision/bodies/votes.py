@@ -18,12 +18,12 @@ Between 3 and 4, vision/bodies/grouping.py corrects the winners of whole parts.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hal.compiled import compiled
+from hal.records import record
 from hal.types import FlagMatrix, FloatArray
 from vision.bodies.arrivals import MUCH_ARRIVED_CELLS
 from vision.bodies.tracks import Tracks
@@ -46,7 +46,7 @@ _LEFT_SHARE = 0.6  # of its width: a mover displaced by more has clearly left it
 _STAYED_SHARE = 0.7  # of a mover's votes must be for cells that have stayed; the others lie at the rims
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class Ballot:
     """The votes of T tracks in P parts.
 

@@ -7,13 +7,13 @@ is estimated (with_ego_motion). In doubt a frame is not trusted.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
 
 from config.perception import PerceptionConfig
 from hal.compiled import compiled
+from hal.records import record
 from hal.types import Pose, RgbdFrame
 from vision.camera.frozen_depth import FrozenDepth
 from vision.depth.depth_grid import DepthGrid
@@ -44,7 +44,7 @@ class Continuity(Enum):
     GAP = "gap"
 
 
-@dataclass(frozen=True, slots=True)
+@record(frozen=True, slots=True)
 class FrameCheck:
     """usable: whether both images say anything. health: what the scene reports."""
 

@@ -10,6 +10,7 @@ import math
 from collections import deque
 from dataclasses import dataclass
 
+from hal.records import record
 from vision.camera.floor import Floor, FloorFinder, cells_on
 from vision.camera.health import worsened
 from vision.depth.depth_grid import DepthGrid
@@ -78,7 +79,7 @@ class MountCheck:
         return not any(_apart(look.floor, last, _SAME) for look in self._looks)
 
 
-@dataclass(frozen=True, slots=True)
+@record(frozen=True, slots=True)
 class _Look:
     """One look at the floor. off, plainly_off: it is elsewhere by more than _WRONG, by _PLAINLY_WRONG."""
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from config.perception import PerceptionConfig
 from hal.compiled import compiled, inlined
+from hal.records import record
 from hal.types import CameraMount, DepthImage, FloatArray, Intrinsics, RgbdFrame
 from vision.depth.depth_mask import measurable_m
 
@@ -40,7 +41,7 @@ NO_OWN_CELLS: BoolGrid = np.zeros((0, 0), np.bool_)
 _AGREE_INVERSE = 0.03  # 1/m: samples of a cell that differ by more lie on two surfaces
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class DepthGrid:
     """Depth of the view in (h, w) cells, each for one block of pixels.
 

@@ -7,13 +7,12 @@ and, at a silhouette, a far one as well.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import DepthNoise, PerceptionConfig
 from hal.compiled import compiled, inlined
+from hal.records import record
 from hal.types import DepthImage, FloatArray
 from vision.camera.lens import RealArray
 from vision.depth.depth_noise import depth_sigma_of
@@ -29,7 +28,7 @@ UNSEEN_M = 12.0  # assumed depth of an unseen surface
 _CUT_OFF = np.iinfo(np.uint16).max  # raw depth that stands for this distance and all larger ones
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class SurfaceDepth:
     """Surfaces around N pixels.
 

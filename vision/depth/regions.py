@@ -7,11 +7,11 @@ region): vision/__init__.py.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from hal.compiled import compiled, inlined
+from hal.records import record
 from hal.types import Flags, FloatArray, Integers, Matrix
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import DepthGrid, FloatGrid
@@ -23,7 +23,7 @@ _FOOT_M, _FOOT_PER_METRE = 0.12, 0.015
 _RIM = 8  # the rim of a part on either side is 1/8 of its columns
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class Regions:
     """Measures of R labelled parts of the grid. An entry without cells has cells == 0.
 

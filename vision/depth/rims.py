@@ -8,13 +8,13 @@ Terms (cell, part): vision/__init__.py.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hal.compiled import compiled, inlined
+from hal.records import record
 from hal.types import FloatArray, Matrix
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import DepthGrid
@@ -31,7 +31,7 @@ _BAND_SHARE = 0.125
 _FARTHER = 0.012  # 1/m: three standard deviations of the depth of a cell, or 0.3 m at 5 m
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class FreeRims:
     """The free rims of R parts, LEFT and RIGHT of each.
 

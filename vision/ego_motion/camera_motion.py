@@ -33,11 +33,12 @@ the same time. The points still tell the motion then, but with twice the assumed
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import cv2
 import numpy as np
 
+from hal.records import record
 from hal.types import FloatArray, Intrinsics, Pose
 from vision.ego_motion.lone_body import without_lone_body
 from vision.ego_motion.motion_prior import MotionPrior, SweepPrior
@@ -64,7 +65,7 @@ _CERTAIN_CHI2 = 9.0  # three sigmas
 _STRAIGHTENED_SHARE = 0.05  # of the points: minimum of additional inliers to accept the larger sweep
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class CameraEstimate:
     """The camera's pose and sweep in one frame.
 
@@ -95,7 +96,7 @@ class CameraEstimate:
         return self.noise_scale > 1.0
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class _Points:
     """Anchored points, and where the camera sees them now, pixels (N, 2)."""
 
@@ -115,7 +116,7 @@ class _Points:
         return fit(view_of(self.anchors, self.pixels, left_out, self.camera), start, sigma).inliers
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class _Fitted:
     """A fit to the points of view; the sigma (8,) of its prior; its _bend."""
 

@@ -13,11 +13,12 @@ A prior has a mean (a Pose) and six standard deviations. It does not depend on t
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from config.perception import EgoMotionSettings
+from hal.records import record
 from hal.types import CameraMount, FloatArray, Pose
 from vision.camera.lens import rotation_from_vector, vector_from_rotation
 from vision.ego_motion.forward_speed import ForwardSpeed, ahead, down
@@ -26,7 +27,7 @@ _STEADY_RADPS = 0.02  # added to what slip explains of a turn: noise of the turn
 _SIDEWAYS_MPS = 0.10  # one sigma across the direction of travel: vibration, and slip while turning
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class MotionPrior:
     """Prior of the camera's motion.
 
@@ -51,7 +52,7 @@ class MotionPrior:
         return math.isfinite(self.slip_rad)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class SweepPrior:
     """Prior of how far the camera turns about x and y while an image is read; its mean is 0.
 

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hal.compiled import compiled
+from hal.records import record
 from hal.types import Flags, FloatArray, Intrinsics, Matrix, Vector
 from vision.camera.lens import ray_through, row_delays
 
 _Rows = Annotated[FloatArray, "float64[:, ::1]"]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class Anchors:
     """N points seen some frames ago.
 
@@ -36,7 +36,7 @@ class Anchors:
     left_out: Flags
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class View:
     """The usable points as arrays for the fit.
 

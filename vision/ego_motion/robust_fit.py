@@ -10,12 +10,12 @@ included by the Sherman-Morrison formula.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hal.compiled import compiled, inlined
+from hal.records import record
 from hal.types import FloatArray, Pose
 from vision.camera.lens import MIN_AHEAD_M
 from vision.ego_motion.pose_arrays import as_array, back_to, in_camera, moved, turned_back
@@ -31,7 +31,7 @@ _SWEEP = 6  # index of the first unknown of the sweep
 _RESIDUAL = _UNKNOWNS  # column of the residual, after those of the derivatives
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class Fit:
     """Result of a fit.
 

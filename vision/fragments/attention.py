@@ -8,12 +8,11 @@ measure the motion of that body only. The camera's motion is not estimated from 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import PerceptionConfig
+from hal.records import record
 from hal.types import FloatArray, RgbdFrame
 from vision.depth.depth_mask import surface_depth
 from vision.fragments.candidates import (
@@ -50,7 +49,7 @@ _ONE_SURFACE = 0.5  # maximum distance of near and far surface at an end, as a s
 _HOLES = 0.2  # of the 25 samples around an end: from 0.25 on there may be another surface (depth_mask.py)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class NeedsFragments:
     """K bodies with too few fragments.
 
@@ -68,7 +67,7 @@ class NeedsFragments:
     urgent: NDArray[np.bool_]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class _Body:
     """A body that is looked at in a frame.
 

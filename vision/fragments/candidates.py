@@ -5,13 +5,12 @@ Used by vision/fragments/renewal.py and attention.py.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import DepthNoise, FragmentSettings, PerceptionConfig
 from hal.compiled import compiled, inlined
+from hal.records import record
 from hal.types import FloatArray, RgbdFrame
 from vision.depth.depth_mask import SurfaceDepth, surface_depth
 from vision.depth.depth_noise import depth_sigma_of
@@ -29,7 +28,7 @@ _SAME_M, _SAME_SIGMAS = 0.05, 3.0  # added, the gate on depth: the surface is un
 _PLACES = 5  # number of points along a segment, evenly from end to end, at which its depth is read
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class NewFragments:
     """N new fragments.
 

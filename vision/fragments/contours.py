@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from hal.compiled import compiled
+from hal.records import record
 from vision.fragments.edges import GreyImage
 
 _PIECE = 1.5  # maximum length of a piece of a contour, relative to the minimum length
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class Contours:
     """ends_px (N, 2, 2): the two ends of each piece of a contour. edges (H, W): edge image without the short
     contours."""

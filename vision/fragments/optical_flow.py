@@ -8,14 +8,13 @@ the scouts is the common one; the others are then searched in the finest level a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import FragmentSettings
 from hal.compiled import compiled
+from hal.records import record
 from vision.fragments import lucas_kanade
 from vision.fragments.edges import GreyImage
 from vision.numerics.order import median_of
@@ -31,7 +30,7 @@ _SCOUT_EVERY, _SAMPLE = 8, 16
 Pyramid = tuple[GreyImage, ...]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class Flow:
     """Where N points are in the new image.
 

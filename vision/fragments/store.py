@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.compiled import compiled
+from hal.records import record
 from hal.types import FloatArray, Integers, Intrinsics, Matrix, Pose, Vector
 from vision.ego_motion.rolling_shutter import straight_rays
 from vision.fragments.candidates import NewFragments
@@ -21,7 +22,7 @@ HISTORY = 24  # frames: enough for the window of 0.25 s at 90 frames a second
 _FEWEST_PLACES = 64  # places in the history at first; it grows by doubling
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class AnchorEnds:
     """Where the 2N ends of N fragments were some frames ago; the two ends of a fragment are adjacent.
 

@@ -9,13 +9,13 @@ updates the running average of each end's depth, as if the end were static.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import DepthNoise
 from hal.compiled import compiled
+from hal.records import record
 from hal.types import Flags, FloatArray, Pose, Vector
 from vision.depth.depth_mask import UNSEEN_M
 from vision.depth.depth_noise import depth_sigma_of
@@ -36,7 +36,7 @@ _MIXED_M, _MIXED_SIGMAS = 0.1, 3.0
 _SAME_M, _SAME_SIGMAS = 0.05, 3.0
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class AnchorDepths:
     """Depths of 2N anchored ends with their uncertainty, (2N,) each.
 

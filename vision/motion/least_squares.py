@@ -6,12 +6,11 @@ body is robust (iteratively reweighted), since some of its ends slide along edge
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from hal.compiled import compiled, inlined
+from hal.records import record
 from hal.types import FloatArray, Integers, Matrices, Matrix, Vector
 from vision.motion.velocities import EndResiduals, normal_equations
 
@@ -25,7 +24,7 @@ _ANNEAL = (64.0, 16.0, 4.0, 1.0)
 _INDEPENDENT_DEPTHS = 10.0  # neighbours share depth noise: a body has no more independent depths than this
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class BodyVelocities:
     """Velocities of G bodies.
 
@@ -43,7 +42,7 @@ class BodyVelocities:
     contradicts_static: Vector
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class FragmentVelocities:
     """Velocities of N fragments, each from its two ends alone.
 

@@ -11,7 +11,6 @@ rests on these residuals among other things, is in vision/bodies/motion_evidence
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
@@ -19,6 +18,7 @@ from numpy.typing import NDArray
 
 from config.perception import DepthNoise
 from hal.compiled import compiled, inlined
+from hal.records import record
 from hal.types import FloatArray, Intrinsics, Matrix, Pose
 from vision.camera.lens import MIN_AHEAD_M
 from vision.depth.depth_noise import depth_sigma_of
@@ -45,7 +45,7 @@ _Covariance = tuple[float, float, float]  # xx, xy, yy
 _Pixels = Annotated[NDArray[np.float32], "float32[:, :, :]"]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class _EndsNow:
     """The 2N ends of N fragments as they are seen now.
 
@@ -59,7 +59,7 @@ class _EndsNow:
     pixel_cov: _Pixels
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class _Uncertainty:
     """Of all ends alike.
 

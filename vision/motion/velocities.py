@@ -14,18 +14,17 @@ in the centre. The third equation is the measurement of the depth image, weighte
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from hal.compiled import compiled
+from hal.records import record
 from hal.types import Flags, FloatArray, Matrix, Vector
 
 STATIC_END_CHI2 = 6.0  # of static_chi2: 95 % of static ends lie below; 2 degrees of freedom
 _MIN_DETERMINANT = 1e-18  # m^4, of a covariance: a lower bound that avoids a division by 0
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class EndResiduals:
     """Residuals of N tracked points, in the present camera axes. Symbols: see the module docstring.
 
