@@ -39,9 +39,10 @@ def pixel_of(camera: Intrinsics, x: float, y: float, z: float) -> tuple[float, f
     return x / z * camera.fx + camera.cx, y / z * camera.fy + camera.cy
 
 
-def row_delays(v_px: RealArray, camera: Intrinsics) -> FloatArray:
-    """(N,) when rows v_px (N,) are read, in read-out times: -0.5 for the first row, 0.5 for the last one."""
-    return v_px.astype(np.float64) / camera.height - 0.5
+@inlined
+def row_delay(camera: Intrinsics, v: float) -> float:
+    """When row v is read, in read-out times: -0.5 for the first row, 0.5 for the last; for compiled steps."""
+    return v / camera.height - 0.5
 
 
 def rotation_from_vector(vector_rad: FloatArray) -> FloatArray:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from hal.compiled import compiled
 from hal.records import record
 from hal.types import Flags, FloatArray, Intrinsics, Matrix, Vector
-from vision.camera.lens import ray_through, row_delays
+from vision.camera.lens import ray_through, row_delay
 
 _Rows = Annotated[FloatArray, "float64[:, ::1]"]
 
@@ -41,7 +41,7 @@ class View:
     """The usable points as arrays for the fit.
 
     lines: each point and its derivative by depth, (N, 2, 3).
-    seen: its position on the plane z = 1, and when its row was read (row_delays), (N, 3).
+    seen: its position on the plane z = 1, and when its row was read (row_delay), (N, 3).
     whitening: w0, w1, w2, which whiten an error (a, b) on that plane to (w0 a, w1 a + w2 b), of unit
         variance; then the variance of its depth, (N, 4).
     """
@@ -59,14 +59,13 @@ class View:
 
 def view_of(anchors: Anchors, pixels: FloatArray, use: NDArray[np.intp], camera: Intrinsics) -> View:
     """The View of the points use (M,), as indices. pixels (N, 2): where the points are seen now."""
-    return View(*_view(anchors, pixels, row_delays(pixels[:, 1], camera), use, camera))
+    return View(*_view(anchors, pixels, use, camera))
 
 
-@compiled(Anchors, "float64[:, :], float64[::1], int64[::1]", Intrinsics)
+@compiled(Anchors, "float64[:, :], int64[::1]", Intrinsics)
 def _view(
     anchors: Anchors,
     pixels: FloatArray,
-    delays: FloatArray,
     use: NDArray[np.intp],
     camera: Intrinsics,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -78,7 +77,7 @@ def _view(
         for i in range(3):
             lines[k, 0, i], lines[k, 1, i] = anchors.points_m[one, i], anchors.range_m[one, i]
         seen[k, 0], seen[k, 1] = ray_through(camera, pixels[one, 0], pixels[one, 1])
-        seen[k, 2] = delays[one]
+        seen[k, 2] = row_delay(camera, pixels[one, 1])
         # The inverse of the Cholesky factor.
         uu, uv, vv = anchors.pixel_cov[one]
         first = math.sqrt(uu)

@@ -16,10 +16,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hal.compiled import compiled
 from hal.types import FloatArray, Intrinsics
-from vision.camera.lens import RealArray, rays, row_delays
+from vision.camera.lens import row_delay
 from vision.ego_motion.camera_motion import CameraEstimate
 from vision.ego_motion.motion_prior import SweepPrior
 
@@ -31,21 +32,25 @@ _MIN_SWEEP_RAD = 1e-9  # practically 0, but avoids a division by 0
 _RATE_MEMORY = 0.9  # per frame: decay of the fastest rate of turn, since vibration varies between frames
 
 
-def straight_rays(pixels: RealArray, camera: Intrinsics, sweep_rad: FloatArray) -> FloatArray:
+def straight_rays(pixels: NDArray[np.float32], camera: Intrinsics, sweep_rad: FloatArray) -> FloatArray:
     """(N, 3) points at z = 1 m behind pixels (N, 2), as if all rows had been read with the middle one.
 
     sweep_rad (2,): how far the camera turned about x and y while the image was read.
     """
-    delays = row_delays(pixels[:, 1], camera)
-    return _straightened(rays(pixels, camera).T, delays, float(sweep_rad[0]), float(sweep_rad[1])).T
+    return _straightened(pixels, camera, sweep_rad).T
 
 
-@compiled("float64[:, ::1], float64[::1], float64, float64")
-def _straightened(plane: FloatArray, delays: FloatArray, sweep_x: float, sweep_y: float) -> FloatArray:
-    """As straight_rays. plane and the result: (3, N). delays (N,): when each point was read."""
-    result = np.ones_like(plane)
-    for k in range(len(delays)):
-        x, y, about_x, about_y = plane[0, k], plane[1, k], sweep_x * delays[k], sweep_y * delays[k]
+@compiled("float32[:, :]", Intrinsics, "float64[:]")
+def _straightened(pixels: NDArray[np.float32], camera: Intrinsics, sweep_rad: FloatArray) -> FloatArray:
+    """As straight_rays, (3, N)."""
+    result = np.ones((3, len(pixels)))
+    cx, cy = np.float32(camera.cx), np.float32(camera.cy)
+    fx, fy = np.float32(camera.fx), np.float32(camera.fy)
+    for k in range(len(pixels)):
+        # As rays in vision/camera/lens.py, in single precision.
+        x, y = np.float64((pixels[k, 0] - cx) / fx), np.float64((pixels[k, 1] - cy) / fy)
+        delay = row_delay(camera, np.float64(pixels[k, 1]))
+        about_x, about_y = sweep_rad[0] * delay, sweep_rad[1] * delay
         # Derivatives by a small rotation, as in vision/ego_motion/robust_fit.py.
         result[0, k] = x - (about_x * x * y - about_y * (1.0 + x * x))
         result[1, k] = y - (about_x * (1.0 + y * y) - about_y * x * y)

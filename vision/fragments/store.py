@@ -157,10 +157,8 @@ class FragmentStore:
         history.head = (history.head + 1) % HISTORY
         history.comparable = min(history.comparable + 1, HISTORY)
         direction = pose.rotation @ straight_rays(self.ends_px.reshape(-1, 2), camera, sweep_rad).T
-        ends = np.empty((len(self), 2, 6))
-        ends[..., :3] = direction.T.reshape(-1, 2, 3)
-        ends[..., 3], ends[..., 4], ends[..., 5] = self.depth_m, self.far_m, self.depth_samples
-        history.ends[history.head, self._place] = ends
+        entries = _entries(direction, self.depth_m, self.far_m, self.depth_samples)
+        history.ends[history.head, self._place] = entries
         history.stamps_ns[history.head] = stamp_ns
         history.origins[history.head] = pose.translation_m
         self.age_frames += 1
@@ -198,6 +196,24 @@ class FragmentStore:
             lag_frames=lag,
             lag_s=lag_s,
         )
+
+
+@compiled("float64[:, :], float32[:, :], float32[:, :], float32[:, :]")
+def _entries(
+    direction: FloatArray,
+    depth_m: NDArray[np.float32],
+    far_m: NDArray[np.float32],
+    depth_samples: NDArray[np.float32],
+) -> FloatArray:
+    """(N, 2, 6) what a frame adds to the history. direction (3, 2N): of the ends in the fixed frame."""
+    entries = np.empty((len(depth_m), 2, 6))
+    for n in range(len(depth_m)):
+        for end in range(2):
+            for i in range(3):
+                entries[n, end, i] = direction[i, 2 * n + end]
+            entries[n, end, 3], entries[n, end, 4] = depth_m[n, end], far_m[n, end]
+            entries[n, end, 5] = depth_samples[n, end]
+    return entries
 
 
 @compiled(_History, "int64[::1], int64[::1], int64, int64, float64")

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from hal.types import FloatArray, Intrinsics, Pose
 from tests.support.point_motion import project
-from vision.camera.lens import rays, rotation_from_vector, row_delays, vector_from_rotation
+from vision.camera.lens import rays, rotation_from_vector, vector_from_rotation
 from vision.ego_motion.camera_motion import CameraEstimate, estimate
 from vision.ego_motion.motion_prior import MotionPrior, SweepPrior
 from vision.ego_motion.reprojection import Anchors
@@ -28,7 +28,7 @@ def bent(points_m: FloatArray, camera_pose: Pose, sweep_rad: FloatArray) -> Floa
     local = camera_pose.inverse().apply(points_m)
     pixels = project(local, CAMERA)
     for _ in range(4):  # which row a point falls on depends on when that row is read
-        delays = row_delays(pixels[:, 1], CAMERA)
+        delays = pixels[:, 1] / CAMERA.height - 0.5
         turned = [
             rotation_from_vector(np.array([*(sweep_rad * delay), 0.0])).T @ point
             for point, delay in zip(local, delays, strict=True)
@@ -47,22 +47,22 @@ def points(count: int = 160) -> FloatArray:
 def test_the_last_row_by_hand() -> None:
     # Read half a sweep late: 0.002 rad about x, along the middle column y' = y - 0.002 (1 + y^2).
     y = (480.0 - 239.5) / 600.0
-    found = straight_rays(np.array([[319.5, 480.0]]), CAMERA, np.array([0.004, 0.0]))
-    np.testing.assert_allclose(found, [[0.0, y - 0.002 * (1.0 + y * y), 1.0]])
+    found = straight_rays(np.array([[319.5, 480.0]], np.float32), CAMERA, np.array([0.004, 0.0]))
+    np.testing.assert_allclose(found, [[0.0, y - 0.002 * (1.0 + y * y), 1.0]], rtol=1e-6)
     # About y the image goes the other way: x' = 0.002 (1 + 0).
-    found = straight_rays(np.array([[319.5, 480.0]]), CAMERA, np.array([0.0, 0.004]))
-    np.testing.assert_allclose(found, [[0.002, y, 1.0]])
+    found = straight_rays(np.array([[319.5, 480.0]], np.float32), CAMERA, np.array([0.0, 0.004]))
+    np.testing.assert_allclose(found, [[0.002, y, 1.0]], rtol=1e-6)
 
 
 def test_without_a_sweep_nothing_changes() -> None:
-    pixels = project(points(), CAMERA)
+    pixels = project(points(), CAMERA).astype(np.float32)
     np.testing.assert_array_equal(straight_rays(pixels, CAMERA, np.zeros(2)), rays(pixels, CAMERA))
 
 
 @given(st.floats(-0.01, 0.01), st.floats(-0.01, 0.01))
 def test_bending_by_a_turn_is_corrected_to_a_hundredth_of_a_pixel(about_x: float, about_y: float) -> None:
     sweep_rad = np.array([about_x, about_y])
-    off = straight_rays(bent(points(40), HERE, sweep_rad), CAMERA, sweep_rad) - rays(
+    off = straight_rays(bent(points(40), HERE, sweep_rad).astype(np.float32), CAMERA, sweep_rad) - rays(
         project(points(40), CAMERA), CAMERA
     )
     assert np.abs(off).max() * CAMERA.fx < 0.05
