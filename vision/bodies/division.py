@@ -8,9 +8,12 @@ vision/__init__.py.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
+from hal.compiled import compiled
 from hal.types import FloatArray
 from vision.bodies.births import MIN_CELLS
 from vision.bodies.sizes import (
@@ -82,12 +85,11 @@ def second_body(
     * the groups were found by a valley, one of them is too wide for a person, and hardly anything farther is
       seen in the valley.
     """
-    cells = (labels.ravel() == track + 1).nonzero()[0]
-    if len(cells) < 2 * _MIN_GROUP:
+    cells, across, diagonal_m = _from_above(grid, labels, track + 1)
+    # A quick test that many tracks end at: no line can be longer than the diagonal.
+    if len(cells) < 2 * _MIN_GROUP or diagonal_m < _PAIR_WIDTH_M:
         return None
-    points = grid.points(cells)[::2].T.astype(float)
-    if np.hypot(*(points.max(axis=0) - points.min(axis=0))) < _PAIR_WIDTH_M:
-        return None  # a quick test that most tracks end at: no line can be longer than this diagonal
+    points = across.T
     centred = points - median(points.T)
     _, axes = np.linalg.eigh(centred.T @ centred)
     along = centred @ axes[:, 1]
@@ -112,6 +114,25 @@ def second_body(
         smaller_group = ~smaller_group
     cut_off: NDArray[np.intp] = cells[smaller_group]
     return cut_off
+
+
+@compiled(DepthGrid, "int32[:, ::1], int64")
+def _from_above(grid: DepthGrid, labels: IntGrid, label: int) -> tuple[NDArray[np.intp], FloatArray, float]:
+    """Flat cells (K,) with a label; how far right and ahead they are (2, K); the diagonal of their box."""
+    height, width = labels.shape
+    cells, count = np.empty(labels.size, np.intp), 0
+    for i in range(height):
+        for j in range(width):
+            if labels[i, j] == label:
+                cells[count] = i * width + j
+                count += 1
+    cells, points = cells[:count].copy(), np.empty((2, count))
+    for k in range(count):
+        i, j = cells[k] // width, cells[k] % width
+        points[0, k], points[1, k] = grid.x[j] * grid.depth_m[i, j], grid.depth_m[i, j]
+    if count == 0:
+        return cells, points, 0.0
+    return cells, points, math.hypot(points[0].max() - points[0].min(), points[1].max() - points[1].min())
 
 
 def _stands(
