@@ -23,10 +23,10 @@ from vision.bodies.births import MIN_CELLS
 from vision.bodies.cutting import Cut
 from vision.bodies.masks import cells_of
 from vision.bodies.sizes import SINGLE_WIDTH_M
-from vision.bodies.tracks import Tracks
+from vision.bodies.tracks import Tracks, speed_of
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import BoolGrid, DepthGrid
-from vision.depth.depth_noise import depth_sigma_m
+from vision.depth.depth_noise import depth_sigma_of
 from vision.depth.regions import Regions
 from vision.detection import Detection
 from vision.numerics.pose_axes import inner_vector
@@ -76,13 +76,16 @@ def cuts(
     ]
 
 
+@compiled(Tracks, Regions, DepthNoise)
 def _wide_movers(tracks: Tracks, measured: Regions, noise: DepthNoise) -> NDArray[np.bool_]:
     """(T,) tracks that go fast enough to leave something behind, and are wider or deeper than one person."""
-    extent_m, sigma_m = measured.extent_m, depth_sigma_m(measured.position_m[:, 2], noise)
-    wide = (extent_m[:, 0] > SINGLE_WIDTH_M) | (extent_m[:, 2] > SINGLE_WIDTH_M + 2.0 * sigma_m)
-    result: NDArray[np.bool_] = (
-        tracks.moving & (tracks.speed_mps * _LOOK_BACK_S >= _MIN_DISPLACEMENT_M) & wide
-    )
+    result = np.zeros(len(tracks.state), np.bool_)
+    for t in range(len(tracks.state)):
+        width_m, deep_m = measured.extent_m[t, 0], measured.extent_m[t, 2]
+        sigma_m = depth_sigma_of(measured.position_m[t, 2], noise)
+        wide = width_m > SINGLE_WIDTH_M or deep_m > SINGLE_WIDTH_M + 2.0 * sigma_m
+        fast = speed_of(tracks.state[t]) * _LOOK_BACK_S >= _MIN_DISPLACEMENT_M
+        result[t] = tracks.moving[t] and fast and wide
     return result
 
 

@@ -21,22 +21,29 @@ _UPRIGHT = 0.6  # a distance upwards counts for less, by this factor: bodies are
 _VELOCITY_GATE_MPS = 0.5  # plus two sigmas: allows for limbs, which move differently from their body
 
 
+@compiled(EndResiduals, "int64[:]")
 def moving_candidates(motion: EndResiduals, age_frames: NDArray[np.intp]) -> NDArray[np.bool_]:
     """(N,) fragments that no static surface explains.
 
     Both ends contradict it, at the near and at the far depth of a silhouette.
     """
-    chi2 = np.where(motion.usable, motion.static_chi2, 0.0)
-    one, other = chi2[0::2], chi2[1::2]
-    both = (one > STATIC_END_CHI2) & (other > STATIC_END_CHI2)
-    result: NDArray[np.bool_] = both & (one + other > _STATIC_FRAGMENT_CHI2) & (age_frames >= 2)
+    result = np.empty(len(age_frames), np.bool_)
+    for n in range(len(age_frames)):
+        usable = motion.usable[2 * n] and motion.usable[2 * n + 1]
+        one, other = motion.static_chi2[2 * n], motion.static_chi2[2 * n + 1]
+        both = usable and one > STATIC_END_CHI2 and other > STATIC_END_CHI2
+        result[n] = both and one + other > _STATIC_FRAGMENT_CHI2 and age_frames[n] >= 2
     return result
 
 
+@compiled(EndResiduals, "float64[:]")
 def long_static(motion: EndResiduals, age_s: FloatArray) -> NDArray[np.bool_]:
     """(N,) fragments of some age, age_s (N,), both of whose ends are static by their residuals."""
-    still = (motion.usable & (motion.static_chi2 <= STATIC_END_CHI2)).reshape(-1, 2)
-    result: NDArray[np.bool_] = still[:, 0] & still[:, 1] & (age_s >= _LONG_S)
+    result = np.empty(len(age_s), np.bool_)
+    for n in range(len(age_s)):
+        usable = motion.usable[2 * n] and motion.usable[2 * n + 1]
+        most = max(motion.static_chi2[2 * n], motion.static_chi2[2 * n + 1])
+        result[n] = usable and most <= STATIC_END_CHI2 and age_s[n] >= _LONG_S
     return result
 
 
