@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hal.compiled import compiled
+from hal.compiled import compiled, inlined
 from hal.types import Flags, Integers
 from vision.depth.connected import MAX_JUMP, MIN_JUMP, IntGrid
 from vision.depth.depth_grid import BoolGrid, DepthGrid, FloatGrid
@@ -32,17 +32,11 @@ def with_occlusion(grid: DepthGrid, labels: IntGrid, regions: Regions) -> Region
     there at an edge in depth. Where a part was divided from its surroundings by a guess, its centre depends
     on the guess. A part that reaches the blind band of a stereo camera is cut there, as at the image border.
     """
-    hidden, overlapped = _hidden_cells(grid.inverse_depth, labels, len(regions.cells), np.float32(MIN_JUMP))
-    least = _OCCLUDED_SHARE * regions.rows
-    cut = _cut_by_blind_band(grid.valid, labels, len(regions.cells))
-    return replace(
-        regions,
-        sides_visible=regions.sides_visible & (hidden <= least) & ~cut,
-        overlapped=overlapped > least,
-    )
+    sides_visible, overlapped = _sides(grid, labels, regions)
+    return replace(regions, sides_visible=sides_visible, overlapped=overlapped)
 
 
-@compiled("boolean[:, ::1], int32[:, ::1], int64")
+@inlined
 def _cut_by_blind_band(valid: BoolGrid, labels: IntGrid, count: int) -> Flags:
     """(count,) parts with a cell beside a band without depth at the left or right border of the image."""
     height, width = labels.shape
@@ -58,7 +52,7 @@ def _cut_by_blind_band(valid: BoolGrid, labels: IntGrid, count: int) -> Flags:
     return cut[1 : count + 1].copy()
 
 
-@compiled("float32[:, ::1], int32[:, ::1], int64, float32")
+@inlined
 def _hidden_cells(
     inverse: FloatGrid, labels: IntGrid, count: int, jump: np.float32
 ) -> tuple[Integers, Integers]:
@@ -92,6 +86,20 @@ def _hidden_cells(
             if beside != here and abs(step) > jump:
                 overlapped[beside if step > 0 else here] += 1
     return hidden[1 : count + 1].copy(), overlapped[1 : count + 1].copy()
+
+
+@compiled(DepthGrid, "int32[:, ::1]", Regions)
+def _sides(grid: DepthGrid, labels: IntGrid, regions: Regions) -> tuple[Flags, Flags]:
+    """sides_visible and overlapped of with_occlusion."""
+    count = len(regions.cells)
+    hidden, overlapping = _hidden_cells(grid.inverse_depth, labels, count, np.float32(MIN_JUMP))
+    cut = _cut_by_blind_band(grid.valid, labels, count)
+    sides_visible, overlapped = np.empty(count, np.bool_), np.empty(count, np.bool_)
+    for part in range(count):
+        least = _OCCLUDED_SHARE * regions.rows[part]
+        sides_visible[part] = regions.sides_visible[part] and hidden[part] <= least and not cut[part]
+        overlapped[part] = overlapping[part] > least
+    return sides_visible, overlapped
 
 
 @compiled(DepthGrid, "int32[:, ::1]", Regions)
