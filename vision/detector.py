@@ -134,7 +134,7 @@ class Detector:
         motion = self._measure_residuals(frame, anchor, depths, found, excluded)
         camera = self._learn_motion(found, prior, dt_s)
         health = with_ego_motion(now.health, camera.ego, camera.blurred, camera.reckoned)
-        detection = self._detection(replace(now, health=health), motion, camera)
+        detection = self._detection(now, health, motion, camera)
         self._renew_fragments(now, previous, excluded, dt_s)
         if camera.ego.source != "visual" or camera.blurred:
             store.break_history()
@@ -248,24 +248,26 @@ class Detector:
         self._read_out.forget_last()
         self._memory.forget()
         self._renew(now)
-        detection = self._detection(now, unknown_residuals(2 * len(self._store)), restarted=True)
+        unknown = unknown_residuals(2 * len(self._store))
+        detection = self._detection(now, now.health, unknown, restarted=True)
         self._commit(now, pyramid(now.grey, self._config.fragments), _NO_SWEEP)
         return detection
 
     def _not_usable(self, now: _Now) -> Detection:
         """A frame in which nothing can be tracked; the fragments wait for the next usable frame."""
         self._read_out.forget_last()
-        return self._detection(now, unknown_residuals(2 * len(self._store)))
+        return self._detection(now, now.health, unknown_residuals(2 * len(self._store)))
 
     def _detection(
         self,
         now: _Now,
+        health: CameraHealth,
         motion: EndResiduals,
         camera: CameraMotion = NOT_COMPARED,
         *,
         restarted: bool = False,
     ) -> Detection:
-        frame, store, self._last_health = now.frame, self._store, now.health
+        frame, store, self._last_health = now.frame, self._store, health
         return Detection(
             captured_ns=frame.captured_ns,
             sequence=frame.sequence,
@@ -279,7 +281,7 @@ class Detector:
             motion=motion,
             pose=self._pose,
             ego_motion=camera.ego,
-            health=now.health,
+            health=health,
             restarted=restarted,
             motion_known=camera.known,
             reckoned=camera.reckoned,

@@ -44,14 +44,15 @@ def obstacles(tracks: Tracks, detection: Detection) -> tuple[Obstacle, ...]:
     result = []
     ids, born_ns, fragments_on = tracks.ids.tolist(), tracks.born_ns.tolist(), tracks.fragments.tolist()
     score, unseen, is_moving = tracks.confidence.tolist(), unseen_s.tolist(), reported_moving.tolist()
+    boxes, extent_m = bbox.tolist(), tracks.extent_m.copy()
     for t in listed.nonzero()[0].tolist():
-        u0, v0, u1, v1 = bbox[t].tolist()
+        u0, v0, u1, v1 = boxes[t]
         result.append(
             Obstacle(
                 id=ids[t],
                 bbox_px=(u0, v0, u1, v1),
                 position_m=local[t],
-                extent_m=tracks.extent_m[t].copy(),
+                extent_m=extent_m[t],
                 velocity_mps=velocity[t],
                 velocity_cov=covariance[t],
                 moving=is_moving[t],
