@@ -30,9 +30,10 @@ def median(values: Reals) -> Reals:
 @inlined
 def median_of(values: NDArray[np.float32]) -> np.float32:
     """Median of values (N,), N > 0, as of median(), for compiled steps."""
-    ordered, middle = np.sort(values), len(values) // 2
+    middle = len(values) // 2
+    ordered = np.partition(values, middle)
     upper: np.float32 = ordered[middle]
-    return upper if len(values) % 2 == 1 else np.float32(0.5) * (ordered[middle - 1] + upper)
+    return upper if len(values) % 2 == 1 else np.float32(0.5) * (ordered[:middle].max() + upper)
 
 
 def quantiles(values: RealArray, shares: Sequence[float]) -> tuple[float, ...]:
