@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import DepthNoise, MotionSettings
-from hal.compiled import compiled
+from hal.compiled import compiled, inlined
 from hal.types import Flags, FloatArray, Integers, Intrinsics, Pose
 from vision.bodies.tracks import Tracks
 from vision.camera.lens import ray_through
@@ -109,16 +109,12 @@ def _wild(state: FloatArray, moving: NDArray[np.bool_], most_mps: float) -> Inte
 
 def _note_view(tracks: Tracks, detection: Detection, measured: Regions, kind: NDArray[np.intp]) -> None:
     """Note in tracks how each is visible in this frame: since when, how large, and how much of it."""
-    visible, nearly_hidden, whole = kind != _NOT_VISIBLE, kind == _NEARLY_HIDDEN, measured.whole
-    tracks.nearly_hidden = np.where(
-        visible, nearly_hidden & ~_at_border(measured.bbox_px, detection), tracks.nearly_hidden
+    tracks.nearly_hidden, tracks.velocity_measured_s, tracks.box_m = _views(
+        tracks, measured, kind, detection.camera, detection.grid.step_px, detection.dt_s
     )
-    moved_s = tracks.velocity_measured_s + detection.dt_s
-    tracks.velocity_measured_s = np.where((kind == _WHOLE) & whole, moved_s, 0.0)
+    visible = kind != _NOT_VISIBLE
     tracks.seen_ns[visible] = detection.captured_ns
     tracks.sightings += visible
-    box_is_whole = visible & ((whole & ~nearly_hidden) | (tracks.sightings == 1))
-    tracks.box_m = _boxes_m(tracks, measured, box_is_whole, detection.camera)
     np.copyto(tracks.bbox_px, measured.bbox_px, where=visible[:, None])
     np.copyto(tracks.extent_m, measured.extent_m, where=visible[:, None])
     np.copyto(tracks.cells, measured.cells, where=visible)
@@ -192,29 +188,39 @@ def _centre_covariances(
     return covariance
 
 
-@compiled(Tracks, Regions, "boolean[::1]", Intrinsics)
-def _boxes_m(
-    tracks: Tracks, measured: Regions, box_is_whole: NDArray[np.bool_], camera: Intrinsics
-) -> FloatArray:
-    """box_m (T, 4) of the tracks, with the entries of those with box_is_whole (T,) renewed.
-
-    Left, upper, right and lower edge of the image box as offsets from the centroid, in metres at its depth.
-    """
-    result = tracks.box_m.copy()
-    for t in range(len(box_is_whole)):
-        if box_is_whole[t]:
-            u0, v0, u1, v1 = measured.bbox_px[t]
-            x, y, z = measured.position_m[t]
-            left, upper = ray_through(camera, u0, v0)
-            right, lower = ray_through(camera, u1, v1)
-            result[t] = left * z - x, upper * z - y, right * z - x, lower * z - y
-    return result
+@inlined
+def _box_m(measured: Regions, t: int, camera: Intrinsics) -> tuple[float, float, float, float]:
+    """Left, upper, right, lower edge of an image box as offsets from the centroid, in metres at its depth."""
+    u0, v0, u1, v1 = measured.bbox_px[t]
+    x, y, z = measured.position_m[t]
+    left, upper = ray_through(camera, u0, v0)
+    right, lower = ray_through(camera, u1, v1)
+    return left * z - x, upper * z - y, right * z - x, lower * z - y
 
 
-def _at_border(bbox_px: FloatArray, detection: Detection) -> NDArray[np.bool_]:
-    """(K,) whether boxes (K, 4) reach the left or right border of the image: the rest may lie outside."""
-    step_px = detection.grid.step_px
-    result: NDArray[np.bool_] = (bbox_px[:, 0] <= step_px) | (
-        bbox_px[:, 2] >= detection.camera.width - step_px
-    )
-    return result
+@compiled(Tracks, Regions, "int64[::1]", Intrinsics, "int64, float64")
+def _views(
+    tracks: Tracks,
+    measured: Regions,
+    kind: NDArray[np.intp],
+    camera: Intrinsics,
+    step_px: int,
+    dt_s: float,
+) -> tuple[NDArray[np.bool_], FloatArray, FloatArray]:
+    """nearly_hidden (T,), velocity_measured_s (T,) and box_m (T, 4) of the tracks after this frame."""
+    nearly_hidden, box_m = tracks.nearly_hidden.copy(), tracks.box_m.copy()
+    measured_s = np.zeros(len(kind))
+    for t in range(len(kind)):
+        if kind[t] == _NOT_VISIBLE:
+            continue
+        sides = measured.sides_visible[t] and measured.top_and_bottom_visible[t]
+        whole = sides and not measured.overlapped[t]
+        # The rest of what reaches the left or right border of the image may lie outside.
+        left, right = measured.bbox_px[t, 0], measured.bbox_px[t, 2]
+        at_border = left <= step_px or right >= camera.width - step_px
+        nearly_hidden[t] = kind[t] == _NEARLY_HIDDEN and not at_border
+        if kind[t] == _WHOLE and whole:
+            measured_s[t] = tracks.velocity_measured_s[t] + dt_s
+        if (whole and kind[t] != _NEARLY_HIDDEN) or tracks.sightings[t] == 0:
+            box_m[t] = _box_m(measured, t, camera)
+    return nearly_hidden, measured_s, box_m
