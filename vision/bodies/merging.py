@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from hal.compiled import compiled
 from hal.records import record
 from hal.types import FloatArray
 from vision.bodies.boxes import boxes, farther_between, nearer_between, relations
@@ -105,17 +106,21 @@ def pairs_to_merge(
     return list(zip(small[closest_first].tolist(), large[closest_first].tolist(), strict=True))
 
 
+@compiled("int64[::1], boolean[:], boolean[:]")
 def _candidates(
     cells: NDArray[np.intp], mover: BoolArray, moving: BoolArray
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """All pairs of a mover (T,) and a larger moving track (T,), both seen, as indices (K,) and (K,)."""
-    seen = cells > 0
-    # Of two equally large tracks, the later one counts as the smaller.
-    smaller = (cells[:, None] < cells) | (
-        (cells[:, None] == cells) & np.tri(len(cells), k=-1, dtype=np.bool_)
-    )
-    small, large = np.nonzero((mover & seen)[:, None] & (moving & seen) & smaller)
-    return small, large
+    count, pairs = len(cells), 0
+    small, large = np.empty(count * count, np.intp), np.empty(count * count, np.intp)
+    for one in range(count):
+        for other in range(count):
+            # Of two equally large tracks, the later one counts as the smaller.
+            smaller = cells[one] < cells[other] or (cells[one] == cells[other] and other < one)
+            if cells[one] > 0 and mover[one] and moving[other] and smaller:
+                small[pairs], large[pairs] = one, other
+                pairs += 1
+    return small[:pairs], large[:pairs]
 
 
 def _paired(
