@@ -142,7 +142,9 @@ def _nearer_m(grid: DepthGrid, i: int, j: int, rows: Rows, seen: FloatGrid) -> t
     return (1.0 / inverse - there_m if inverse > 0.0 else math.nan), float(there_m)
 
 
-@compiled(DepthGrid, "int32[:, ::1], int64[::1]", Pose, Pose, "float32[:, ::1]", DepthNoise, "float64, float64")
+@compiled(
+    DepthGrid, "int32[:, ::1], int64[::1]", Pose, Pose, "float32[:, ::1]", DepthNoise, "float64, float64"
+)
 def _compared(
     grid: DepthGrid,
     labels: IntGrid,
