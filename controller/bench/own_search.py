@@ -35,7 +35,7 @@ def by_opencv(
     scale: float,
     side: int,
 ) -> OpenCvCall:
-    """The call that finds what lucas_kanade.search finds with these arguments."""
+    """The call that finds what lucas_kanade.search finds with these arguments, if all points are chosen."""
     options = {
         "winSize": (side, side),
         "maxLevel": 0,
@@ -56,11 +56,13 @@ def recorded_searches(calls: list[OpenCvCall]) -> Iterator[None]:
         now: GreyImage,
         pixels: NDArray[np.float32],
         guess: NDArray[np.float32],
+        chosen: NDArray[np.bool_],
         scale: float,
         side: int,
     ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-        calls.append(by_opencv(before, now, pixels, guess, scale, side).copied())
-        return own(before, now, pixels, guess, scale, side)
+        if chosen.any():  # OpenCV refuses a search for nothing
+            calls.append(by_opencv(before, now, pixels[chosen], guess[chosen], scale, side).copied())
+        return own(before, now, pixels, guess, chosen, scale, side)
 
     vars(lucas_kanade)["search"] = caught
     try:

@@ -234,19 +234,21 @@ def _follow(
     return True, u, v
 
 
-@compiled("uint8[:, ::1], uint8[:, ::1], float32[:, ::1], float32[:, ::1], float64, int64")
+@compiled("uint8[:, ::1], uint8[:, ::1], float32[:, ::1], float32[:, ::1], boolean[::1], float64, int64")
 def search(
     before: GreyImage,
     now: GreyImage,
     pixels: NDArray[np.float32],
     guess: NDArray[np.float32],
+    chosen: NDArray[np.bool_],
     scale: float,
     side: int,
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
     """Where points of before are in now, searched from guess (N, 2); and which are found, (N,).
 
-    pixels (N, 2): the points; scale times that is in pixels of these images, as guess is. side: of the
-    window, at most 41. A point whose window is plain, or out of the image, stays at its guess.
+    pixels (N, 2): the points; scale times that is in pixels of these images, as guess is. chosen (N,): only
+    these are searched. side: of the window, at most 41. A point that is not chosen, or whose window is plain
+    or out of the image, stays at its guess.
     """
     stride = -(-(side + 3) // _STRIDE) * _STRIDE
     count = -(-side * stride // _WINDOW) * _WINDOW
@@ -259,6 +261,8 @@ def search(
     there, found = guess.copy(), np.zeros(len(guess), np.bool_)
     first, window, half = np.uintp(stride + 1), np.uintp(count), 0.5 * (side - 1)
     for n in range(len(pixels)):
+        if not chosen[n]:
+            continue
         u, v = scale * pixels[n, 0] - half, scale * pixels[n, 1] - half
         left, top = math.floor(u), math.floor(v)
         if not _in_reach(top, left, side, before):

@@ -78,10 +78,11 @@ def track(
     scouts = last_error_px > _RELIABLE_PX
     scouts[::every] = True
     start = _by_common_error(_coarse(before, now, pixels, guess, scouts, side), guess, scouts, every)
-    there, there_ok = lucas_kanade.search(before[0], now[0], pixels, start, 1.0, side)
+    everyone = np.ones(len(pixels), np.bool_)
+    there, there_ok = lucas_kanade.search(before[0], now[0], pixels, start, everyone, 1.0, side)
     expected, back_guess, doubtful = _expected(there, guess, pixels)
     back_start = _coarse(now[:2], before[:2], there, back_guess, doubtful, side)
-    back, back_ok = lucas_kanade.search(now[0], before[0], there, back_start, 1.0, side)
+    back, back_ok = lucas_kanade.search(now[0], before[0], there, back_start, there_ok, 1.0, side)
     height, width = now[0].shape
     end, error_px, returned = _confirmed(
         there,
@@ -92,7 +93,7 @@ def track(
         height,
         width,
     )
-    return Flow(end, there_ok & back_ok & returned, error_px)
+    return Flow(end, back_ok & returned, error_px)
 
 
 def _coarse(
@@ -104,15 +105,14 @@ def _coarse(
     side: int,
 ) -> NDArray[np.float32]:
     """guess (N, 2); those that are chosen (N,) as found in all levels but the finest. pixels: (N, 2)."""
-    which = chosen.nonzero()[0]
-    if len(which) == 0:
+    if not chosen.any():
         return guess
-    points, there = pixels.take(which, axis=0), guess.take(which, axis=0) * np.float32(0.5 ** len(now))
+    there = guess * np.float32(0.5 ** len(now))
     for level in range(len(now) - 1, 0, -1):
-        there, _ = lucas_kanade.search(before[level], now[level], points, 2.0 * there, 0.5**level, side)
-    result = guess.copy()
-    result[which] = 2.0 * there
-    return result
+        there, _ = lucas_kanade.search(
+            before[level], now[level], pixels, 2.0 * there, chosen, 0.5**level, side
+        )
+    return 2.0 * there  # of those that are not chosen it is exactly guess again
 
 
 @compiled("float32[:, ::1], float32[:, ::1], bool_[::1], int64")

@@ -5,10 +5,22 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from vision.fragments import lucas_kanade
 from vision.fragments.edges import GreyImage
-from vision.fragments.lucas_kanade import search
 
 SIDE = 11
+
+
+def search(
+    before: GreyImage,
+    now: GreyImage,
+    pixels: NDArray[np.float32],
+    guess: NDArray[np.float32],
+    scale: float,
+    side: int,
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """Search for all points."""
+    return lucas_kanade.search(before, now, pixels, guess, np.ones(len(pixels), np.bool_), scale, side)
 
 
 def pattern(seed: int, height: int = 180, width: int = 240) -> GreyImage:
@@ -108,6 +120,15 @@ def test_neither_a_plain_area_nor_nothing_at_all_is_found() -> None:
     np.testing.assert_array_equal(there, pixels)
     none = np.empty((0, 2), np.float32)
     assert search(plain, plain, none, none, 1.0, SIDE)[0].shape == (0, 2)
+
+
+def test_points_that_are_not_chosen_stay_at_their_guess() -> None:
+    before, pixels = pattern(10), inner_points(11, 4, 30.0)
+    now, chosen = moved(before, 0.5, 0.5), np.array([True, False, True, False])
+    everyone, _ = search(before, now, pixels, pixels, 1.0, SIDE)
+    there, found = lucas_kanade.search(before, now, pixels, pixels, chosen, 1.0, SIDE)
+    np.testing.assert_array_equal(found, chosen)
+    np.testing.assert_array_equal(there, np.where(chosen[:, None], everyone, pixels))
 
 
 def test_a_straight_edge_is_found_across_it() -> None:
