@@ -8,6 +8,8 @@ measure the motion of that body only. The camera's motion is not estimated from 
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -192,7 +194,7 @@ class Attention:
         self._looked_ns = {
             one: at for one, at in self._looked_ns.items() if 0 <= now_ns - at < _REMEMBERED_NS
         }
-        size_px = np.sqrt(np.ptp(bodies.box_px.reshape(-1, 2, 2), axis=1).prod(axis=1)).tolist()
+        size_px = [math.sqrt((u1 - u0) * (v1 - v0)) for u0, v0, u1, v1 in bodies.box_px.tolist()]
         first, longest = None, (False, -1.0)
         for index, (number, urgent) in enumerate(zip(ids, bodies.urgent.tolist(), strict=True)):
             waited_ns = min(now_ns - self._looked_ns.get(number, self._began_ns), _REMEMBERED_NS)
