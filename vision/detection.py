@@ -105,7 +105,7 @@ def camera_motion_of(found: CameraEstimate, step: Pose, dt_s: float, prior: Moti
         dt_s=dt_s,
         source="visual" if found.visual else "disputed" if found.disputed else prior.source,
         inlier_ratio=found.inlier_ratio,
-        sigma_translation_m=float(np.sqrt(variance[3:].sum())),
+        sigma_translation_m=float(np.sqrt(variance[3:6].sum())),
         sigma_rotation_rad=float(np.sqrt(variance[:3].sum())),
     )
     reckoned = prior.source != "none"
