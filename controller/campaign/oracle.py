@@ -26,9 +26,9 @@ from controller.campaign.stage import Stage
 from hal.compiled import compiled
 from hal.types import FloatArray
 
-# Speeds above 0: at 1.5 m/s and 0.3 m/s^2 a step of time is 0.21 s, and one of the way 6.5 mm. A slow robot
-# gets fewer, so that no step of time is shorter than _LEAST_STEP_S: the work grows with the cube of their
-# number.
+# Speeds above 0: at 1.5 m/s and 0.3 m/s^2 a step of time is 0.21 s, and one of the way 6.5 mm. A robot that
+# is slower, or speeds up faster, may get fewer, so that no step of time is shorter than _LEAST_STEP_S: the
+# work grows with the cube of their number.
 _LEVELS, _LEAST_STEP_S = 24, 0.1
 _GRID_M = 0.01  # of the speeds along the path; they are asked for at every tenth place
 _NEVER = -1

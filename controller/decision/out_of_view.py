@@ -191,11 +191,12 @@ class OutOfView:
     def _last_seen_driving(self, bodies: Bodies) -> BoolArray:
         """(N,) which bodies were last seen before the robot came to rest, if it stands now.
 
-        Perception predicts what it no longer sees for a while, and meanwhile the robot may have stopped.
+        Perception predicts what it no longer sees for a while, and meanwhile the robot may have stopped. In
+        the first scene of a standstill it may still have rolled.
         """
         if self._stands_since_ns is None:
             return np.ones(len(bodies), np.bool_)
-        return np.asarray(bodies.captured_ns - bodies.unseen_s * NS_PER_S < self._stands_since_ns)
+        return np.asarray(bodies.captured_ns - bodies.unseen_s * NS_PER_S <= self._stands_since_ns)
 
     def _still_there(
         self, bodies: Bodies, since_s: FloatArray, seen: Bodies, out: BoolArray, pose: PlanarPose

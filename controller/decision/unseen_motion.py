@@ -36,8 +36,8 @@ _SURE_MOVE_SIGMAS, _VERDICT_TRUSTED_S = 5.0, 1.0
 # A body out of view that moves away from the robot's axis may cut in only if it goes along with the robot: if
 # its speed forward is more than this many times its speed outwards. Otherwise it has turned off.
 _ALONG_TO_OUTWARD_RATIO = 4.0
-# A speed within this many standard deviations of 0 is no motion of what is about to stop.
-_AT_REST_SIGMAS = 2.5
+# A speed within this many standard deviations of 0, and below this, is no motion of what is about to stop.
+_AT_REST_SIGMAS, _AT_REST_MPS = 2.5, 0.25
 # Velocities that differ by more standard deviations than this belong to two different bodies.
 _SAME_VELOCITY_SIGMAS = 2.0
 
@@ -131,19 +131,21 @@ def stopped_below_view(bodies: Bodies, pose: PlanarPose, mount: CameraMount, edg
     """(N,) which movers are below the view, ahead of a camera at pose, and hardly moved when last seen.
 
     A verdict takes some frames: what has stopped still counts as moving when it sinks below the view. Their
-    speed was within _AT_REST_SIGMAS standard deviations of 0.
+    speed was within _AT_REST_SIGMAS standard deviations of 0, and at most _AT_REST_MPS. Nothing is said of
+    bodies that were tracked for MIN_TRACKED_S or less: their velocity is hardly known.
     """
     stopped = np.zeros(len(bodies.moving), np.bool_)
     for k in range(len(stopped)):
         ahead, left = ahead_and_left(bodies.xy_m[k], pose, mount)
         near = ahead - bodies.half_view_m[k]
-        if not bodies.moving[k] or ahead <= 0.0 or abs(left) > edges.edge_tan * ahead:
+        hardly_tracked = bodies.tracked_s[k] <= MIN_TRACKED_S
+        if not bodies.moving[k] or hardly_tracked or abs(left) > edges.edge_tan * ahead:
             continue
         (x, y), spread = bodies.velocity_mps[k], bodies.covariance[k]
         # As in _moves_before_verdict.
         squared = x * x + y * y
         variance = x * spread[0, 0] * x + x * (spread[0, 1] + spread[1, 0]) * y + y * spread[1, 1] * y
-        at_rest = squared**2 <= _AT_REST_SIGMAS**2 * variance
+        at_rest = squared <= _AT_REST_MPS**2 and squared**2 <= _AT_REST_SIGMAS**2 * variance
         stopped[k] = at_rest and is_below_view(bodies, k, near, mount.height_m, edges)
     return stopped
 

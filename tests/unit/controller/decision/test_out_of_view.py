@@ -37,7 +37,8 @@ def test_body_that_vanishes_far_away_is_dropped() -> None:
 
 def test_body_that_vanishes_while_the_robot_stands_is_dropped() -> None:
     recall = Recall()
-    recall.see(PALLET, 3.6, standing=True)
+    for _ in range(2):
+        recall.see(PALLET, 3.6, standing=True)
     assert recall.see(None, 3.6, standing=True) == []
 
 
@@ -277,6 +278,30 @@ def test_what_has_stopped_before_it_sinks_below_the_view_is_not_forgotten() -> N
         kept = recall.recall(None, 0.0, ALL_SEEN, standing=True)
     assert kept.moving.tolist() == [False]
     assert kept.xy_m[0].tolist() == pytest.approx([1.0, 0.2])
+
+
+@pytest.mark.parametrize(
+    ("speed_mps", "sigma_mps", "tracked_s"), [(0.3, 0.4, 5.0), (0.14, 0.1, 0.2), (0.42, 0.1, 5.0)]
+)
+def test_what_may_still_move_is_not_taken_to_rest_below_the_view(
+    speed_mps: float, sigma_mps: float, tracked_s: float
+) -> None:
+    """A foot at the lower edge, whose velocity is hardly known; a new track; and what surely moves."""
+    recall = Recall()
+    low = box(1.0, 0.2, 0.0, speed_mps, top_m=0.2, sigma_mps=sigma_mps)
+    recall.recall(replace(low, tracked_s=np.array([tracked_s])), 0.0, ALL_SEEN)
+    assert recall.recall(None, 0.0, ALL_SEEN).moving.tolist() == [True]
+    for _ in range(100):  # for ten seconds
+        kept = recall.see(None, 0.0, standing=True, free=ALL_SEEN)
+    assert kept == []
+
+
+def test_body_last_seen_in_the_first_scene_of_a_standstill_is_kept() -> None:
+    """The robot may still have rolled when that scene was captured."""
+    recall = Recall()
+    recall.see(PALLET, 3.2)
+    recall.see(PALLET, 3.6, standing=True)
+    assert recall.see(None, 3.6, standing=True) == [1]
 
 
 def test_the_longer_it_is_unseen_beside_the_view_the_less_is_known_of_its_velocity() -> None:

@@ -219,7 +219,8 @@ def test_body_that_certainly_moved_goes_on_though_the_robot_stands(
     """What stands and vanishes then has gone by itself; who was going is somewhere."""
     pallet = measured(box(1.6, 0.1, top_m=0.1, sigma_mps=0.1, age_s=age_s), left_mps)
     view = memory()
-    view.update(no_bodies(0), pallet, HERE, EDGES, True, NOTHING_SEEN)
+    view.update(no_bodies(-2 * FRAME_NS), no_bodies(-FRAME_NS), HERE, EDGES, True, NOTHING_SEEN)
+    view.update(no_bodies(-FRAME_NS), pallet, HERE, EDGES, True, NOTHING_SEEN)
     found = view.update(pallet, no_bodies(FRAME_NS), HERE, EDGES, True, NOTHING_SEEN)
     assert found.moving.tolist() == [True] * kept
 

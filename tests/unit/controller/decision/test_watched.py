@@ -19,20 +19,38 @@ from tests.support.floor_bodies import box, line_path
 CORRIDOR = Corridor(line_path(), Body(width_m=0.8, length_m=1.0, rear_m=0.5))
 
 
-def watched(body: Bodies, *, remembered: bool = False, pausing: bool = False) -> Watched:
-    """By a watch that sees body for the first time, with a robot at 0."""
-    watch = Watch(DecisionConfig(), np.arange(0.0, 6.0, 0.1))
-    known = SimpleNamespace(
-        bodies=body,
-        remembered=np.array([remembered]),
-        pausing=np.array([pausing]),
-        corridor=CORRIDOR,
-        since_s=0.0,
-    )
-    watch.take_in(cast(WorldModel, known))
-    found = watch.step(cast(WorldModel, known), 0.0, 10.0)
+def known(body: Bodies, *, remembered: bool = False, pausing: bool = False) -> WorldModel:
+    """What a robot knows that sees body alone."""
+    flags = {"remembered": np.array([remembered]), "pausing": np.array([pausing])}
+    return cast(WorldModel, SimpleNamespace(bodies=body, corridor=CORRIDOR, since_s=0.0, **flags))
+
+
+def step(watch: Watch, model: WorldModel, now_s: float) -> Watched:
+    """Of a robot at 0, after a new scene."""
+    watch.take_in(model)
+    found = watch.step(model, 0.0, now_s)
     assert found is not None
     return found
+
+
+def new_watch() -> Watch:
+    return Watch(DecisionConfig(), np.arange(0.0, 6.0, 0.1))
+
+
+def watched(body: Bodies, *, remembered: bool = False) -> Watched:
+    """By a watch that sees body for the first time."""
+    return step(new_watch(), known(body, remembered=remembered), 10.0)
+
+
+def test_whoever_goes_on_after_a_pause_enters_at_once() -> None:
+    """He walked in for 0.4 s and counts as coming in. A pause is no sign of going elsewhere."""
+    watch, walks, stands = new_watch(), box(3.0, 1.2, 0.0, -0.8), box(3.0, 1.2)
+    entered = [step(watch, known(walks), 0.1 * k).enters.tolist() for k in range(5)]
+    assert entered == [[False]] * 3 + [[True]] * 2
+    for k in range(5, 25):
+        found = step(watch, known(stands, pausing=True), 0.1 * k)
+        assert (found.enters.tolist(), found.bodies.moving.tolist()) == ([False], [True])
+    assert step(watch, known(walks), 2.5).enters.tolist() == [True]
 
 
 def test_whoever_walks_into_the_way_could_enter_before_the_debounce_is_over() -> None:
