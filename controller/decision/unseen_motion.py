@@ -126,6 +126,14 @@ def with_measured_velocity(bodies: Bodies, mistaken_mps: float) -> Bodies:
     return replace(bodies, velocity_mps=velocity, moving=bodies.moving | goes)
 
 
+@inlined
+def _squared_and_variance(velocity_mps: FloatArray, covariance: FloatArray) -> tuple[float, float]:
+    """The square of a speed, v'v, and v' C v: over v'v that is the speed's variance in its own direction."""
+    x, y = velocity_mps
+    mixed = covariance[0, 1] + covariance[1, 0]
+    return x * x + y * y, x * covariance[0, 0] * x + x * mixed * y + y * covariance[1, 1] * y
+
+
 @compiled(Bodies, PlanarPose, CameraMount, ViewEdges)
 def stopped_below_view(bodies: Bodies, pose: PlanarPose, mount: CameraMount, edges: ViewEdges) -> BoolArray:
     """(N,) which movers are below the view, ahead of a camera at pose, and hardly moved when last seen.
@@ -141,10 +149,7 @@ def stopped_below_view(bodies: Bodies, pose: PlanarPose, mount: CameraMount, edg
         hardly_tracked = bodies.tracked_s[k] <= MIN_TRACKED_S
         if not bodies.moving[k] or hardly_tracked or abs(left) > edges.edge_tan * ahead:
             continue
-        (x, y), spread = bodies.velocity_mps[k], bodies.covariance[k]
-        # As in _moves_before_verdict.
-        squared = x * x + y * y
-        variance = x * spread[0, 0] * x + x * (spread[0, 1] + spread[1, 0]) * y + y * spread[1, 1] * y
+        squared, variance = _squared_and_variance(bodies.velocity_mps[k], bodies.covariance[k])
         at_rest = squared <= _AT_REST_MPS**2 and squared**2 <= _AT_REST_SIGMAS**2 * variance
         stopped[k] = at_rest and is_below_view(bodies, k, near, mount.height_m, edges)
     return stopped
@@ -191,10 +196,7 @@ def _moves_before_verdict(bodies: Bodies, sigmas: float, max_mps: float) -> Bool
     for k in range(len(moves)):
         if bodies.moving[k] or not MIN_TRACKED_S <= bodies.tracked_s[k] < _VERDICT_TRUSTED_S:
             continue
-        (x, y), spread = bodies.measured_mps[k], bodies.covariance[k]
-        squared = x * x + y * y
-        # The variance of the speed along the velocity's own direction is v' C v / v'v; this is v' C v.
-        variance = x * spread[0, 0] * x + x * (spread[0, 1] + spread[1, 0]) * y + y * spread[1, 1] * y
+        squared, variance = _squared_and_variance(bodies.measured_mps[k], bodies.covariance[k])
         fast = squared**2 > sigmas**2 * variance and squared > _APPROACH_MIN_MPS**2
-        moves[k] = fast and math.hypot(x, y) <= max_mps
+        moves[k] = fast and math.sqrt(squared) <= max_mps
     return moves

@@ -16,13 +16,6 @@ from tests.support.recall import ALL_SEEN, BANDS, EDGES, FRAME_NS, MOUNT, NOTHIN
 PALLET = box(5.0, 0.0, top_m=0.15)
 
 
-def test_a_low_pallet_sinks_below_the_view() -> None:
-    recall = Recall()
-    assert recall.see(PALLET, 3.2) == []
-    assert recall.see(None, 3.6) == [1]
-    assert recall.see(None, 3.8, standing=True) == [1]
-
-
 def test_tall_body_does_not_sink_below_the_view() -> None:
     recall = Recall()
     recall.see(box(5.0, 0.0, top_m=1.7), 3.2)
@@ -33,24 +26,6 @@ def test_body_that_vanishes_far_away_is_dropped() -> None:
     recall = Recall()
     recall.see(PALLET, 1.0)
     assert recall.see(None, 1.1, free=ALL_SEEN) == []
-
-
-def test_body_that_vanishes_while_the_robot_stands_is_dropped() -> None:
-    recall = Recall()
-    for _ in range(2):
-        recall.see(PALLET, 3.6, standing=True)
-    assert recall.see(None, 3.6, standing=True) == []
-
-
-def test_body_that_the_stopping_robot_loses_from_view_is_not_forgotten_at_rest() -> None:
-    """It was last seen before the stop; until it is given up as missing, perception predicts it."""
-    recall = Recall()
-    recall.see(PALLET, 3.2)
-    for unseen_s in (0.1, 0.2, 0.3):
-        predicted = replace(PALLET, unseen_s=np.array([unseen_s]))
-        assert recall.see(predicted, 3.6, standing=unseen_s > 0.15) == []
-    for _ in range(100):
-        assert recall.see(None, 3.6, standing=True) == [1]
 
 
 def test_body_seen_too_briefly_is_not_kept() -> None:
@@ -261,47 +236,6 @@ def test_body_is_excluded_only_where_the_view_is_seen_through_without_a_gap() ->
     recall.recall(replace(LEAVING, xy_m=np.array([[1.0, 0.1]])), 0.0, free, standing=True)
     kept = recall.recall(None, 0.0, free, standing=True)
     assert kept.xy_m[0].tolist() == pytest.approx([0.99, 0.35 * 0.74 + 0.2])
-
-
-def test_body_too_low_for_the_near_view_may_still_be_there() -> None:
-    recall, low = Recall(), replace(LEAVING, top_m=np.array([0.2]), velocity_mps=np.array([[-0.3, -0.3]]))
-    recall.recall(low, 0.0, ALL_SEEN, standing=True)
-    kept = recall.recall(None, 0.0, ALL_SEEN, standing=True)
-    assert kept.xy_m[0].tolist() == pytest.approx([0.97, 0.17])
-
-
-def test_what_has_stopped_before_it_sinks_below_the_view_is_not_forgotten() -> None:
-    """Still judged moving, as verdicts take some frames, and measured at 0.14 m/s with 0.1 m/s of noise."""
-    recall = Recall()
-    recall.recall(replace(LEAVING, top_m=np.array([0.2])), 0.0, ALL_SEEN)
-    for _ in range(100):  # for ten seconds
-        kept = recall.recall(None, 0.0, ALL_SEEN, standing=True)
-    assert kept.moving.tolist() == [False]
-    assert kept.xy_m[0].tolist() == pytest.approx([1.0, 0.2])
-
-
-@pytest.mark.parametrize(
-    ("speed_mps", "sigma_mps", "tracked_s"), [(0.3, 0.4, 5.0), (0.14, 0.1, 0.2), (0.42, 0.1, 5.0)]
-)
-def test_what_may_still_move_is_not_taken_to_rest_below_the_view(
-    speed_mps: float, sigma_mps: float, tracked_s: float
-) -> None:
-    """A foot at the lower edge, whose velocity is hardly known; a new track; and what surely moves."""
-    recall = Recall()
-    low = box(1.0, 0.2, 0.0, speed_mps, top_m=0.2, sigma_mps=sigma_mps)
-    recall.recall(replace(low, tracked_s=np.array([tracked_s])), 0.0, ALL_SEEN)
-    assert recall.recall(None, 0.0, ALL_SEEN).moving.tolist() == [True]
-    for _ in range(100):  # for ten seconds
-        kept = recall.see(None, 0.0, standing=True, free=ALL_SEEN)
-    assert kept == []
-
-
-def test_body_last_seen_in_the_first_scene_of_a_standstill_is_kept() -> None:
-    """The robot may still have rolled when that scene was captured."""
-    recall = Recall()
-    recall.see(PALLET, 3.2)
-    recall.see(PALLET, 3.6, standing=True)
-    assert recall.see(None, 3.6, standing=True) == [1]
 
 
 def test_the_longer_it_is_unseen_beside_the_view_the_less_is_known_of_its_velocity() -> None:
