@@ -203,6 +203,15 @@ class Room(Section):
             raise ValueError("x_min_m and y_min_m must be smaller than x_max_m and y_max_m")
         return self
 
+    def contains(self, x_m: float, y_m: float) -> bool:
+        """Whether a point on the floor lies between the walls, or on one."""
+        return self.x_min_m <= x_m <= self.x_max_m and self.y_min_m <= y_m <= self.y_max_m
+
+    @property
+    def in_words(self) -> str:
+        """Where its walls are, for messages."""
+        return f"x {self.x_min_m:g} to {self.x_max_m:g}, y {self.y_min_m:g} to {self.y_max_m:g}"
+
 
 class Light(Section):
     """ambient: share of light that reaches every face alike; the rest comes down from the ceiling and from

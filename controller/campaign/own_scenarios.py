@@ -14,6 +14,7 @@ from controller.mission.close_by import close_by_warning
 from controller.mission.options import scenario_as_typed
 from controller.mission.possible_world import require_possible_world
 from controller.mission.short_arcs import short_arc_warning
+from controller.mission.unseen_bodies import unseen_bodies_warning
 from controller.terminal.outlet import say
 
 KEPT = "scenarios"
@@ -49,7 +50,7 @@ def load_own(given: Sequence[str], config: AppConfig) -> dict[str, OwnScenario]:
         own[label] = OwnScenario(one, load_scenario(one))
         in_it = _in_this_world(config, one)
         require_possible_world(in_it)
-        for told in (short_arc_warning, close_by_warning):
+        for told in (short_arc_warning, close_by_warning, unseen_bodies_warning):
             warning = told(in_it)
             if warning is not None:
                 say(f"treadwatch: warning: {warning}", to_stderr=True)

@@ -7,6 +7,7 @@ The files in the order in which they come into play:
 * possible_world.py - refuses a simulated world in which the robot cannot drive
 * short_arcs.py - warns of arcs whose angle was given in radians
 * close_by.py - warns of what stands too near to the path of a simulation
+* unseen_bodies.py - warns of bodies of a simulation that are outside of its room, or set off too late
 * floor_view.py - warns of a mounting from which the floor before the robot is not seen
 * blind_bends.py - warns of bends that the camera cannot see round
 * lockstep_drive.py - a drive in simulated time; realtime_drive.py - one in the rig of controller/realtime

@@ -14,12 +14,14 @@ from controller.mission.realtime_drive import drive_realtime
 from controller.mission.scenario_faults import unused_faults_warning, with_scenario_faults
 from controller.mission.short_arcs import short_arc_warning
 from controller.mission.summary import summary_rows
+from controller.mission.unseen_bodies import unseen_bodies_warning
 from controller.record.observations import STANDARD_OUTPUT
 from controller.terminal.console import Console
 
 _WARNINGS = (
     short_arc_warning,
     close_by_warning,
+    unseen_bodies_warning,
     floor_view_warning,
     blind_bend_warning,
     unused_faults_warning,

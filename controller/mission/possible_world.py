@@ -26,8 +26,8 @@ def require_possible_world(config: AppConfig) -> None:
     world = build_world(config)
     start = f"{where}: path.start: at x {path.start.x_m:g}, y {path.start.y_m:g}"
     room = world.scenario.room
-    if not _is_in(room, path.start.x_m, path.start.y_m):
-        raise ConfigError(f"{start} the robot stands outside of the room, {_in_words(room)}; move it in")
+    if not room.contains(path.start.x_m, path.start.y_m):
+        raise ConfigError(f"{start} the robot stands outside of the room, {room.in_words}; move it in")
     nearest = nearest_body(world, config.robot.body, path.start, 0.0)
     if nearest.touches:
         what = "a wall of the room" if nearest.name == BUILDING else f"the body {nearest.name!r}"
@@ -41,16 +41,8 @@ def _require_path_in(room: Room, path: Path, where: str) -> None:
     along_m = np.linspace(0.0, path.length_m, count)
     x, y, _ = path.poses(along_m)
     for s_m, x_m, y_m in zip(along_m.tolist(), x.tolist(), y.tolist(), strict=True):
-        if not _is_in(room, x_m, y_m):
+        if not room.contains(x_m, y_m):
             raise ConfigError(
                 f"{where}: path: leaves the room {s_m:.1f} m from its start, at x {x_m:.1f}, y {y_m:.1f}; "
-                f"the room is {_in_words(room)}: shorten the path or widen the room"
+                f"the room is {room.in_words}: shorten the path or widen the room"
             )
-
-
-def _is_in(room: Room, x_m: float, y_m: float) -> bool:
-    return room.x_min_m < x_m < room.x_max_m and room.y_min_m < y_m < room.y_max_m
-
-
-def _in_words(room: Room) -> str:
-    return f"x {room.x_min_m:g} to {room.x_max_m:g}, y {room.y_min_m:g} to {room.y_max_m:g}"
