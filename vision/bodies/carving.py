@@ -43,8 +43,9 @@ from vision.motion.least_squares import FragmentVelocities
 from vision.motion.velocities import EndResiduals
 from vision.numerics.order import median
 
-# Score at the start. It is used up in 0.09 s where nothing speaks for motion, in 0.6 s where something does.
-SUSPECT_EVIDENCE = 0.3
+# Score at the start. It is used up in 0.14 s where nothing speaks for motion, in 0.9 s where something does:
+# of somebody far away, in front of a wall, few frames prove that he moves.
+SUSPECT_EVIDENCE = 0.45
 _COMPACT_M = 1.6  # a track wider or deeper than one body with its load may hide another body
 _MIN_FRAGMENTS = 2  # that move alike; one alone may be an end that slides
 # One fragment alone, on a person who walks along a wall, is believed if it has been seen for this long, moves
