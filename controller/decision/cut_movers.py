@@ -12,10 +12,10 @@ import math
 import numpy as np
 
 from controller.decision.bodies import Bodies, extended_towards
-from controller.decision.view_edges import ViewEdges, ahead_and_left, reaches_side_edge
+from controller.decision.view_edges import CurrentView, ahead_and_left, reaches_side_edge
 from hal.compiled import compiled
 from hal.directions import along_and_left
-from hal.types import CameraMount, FloatArray, PlanarPose
+from hal.types import FloatArray
 
 # How much nearer it may extend: about the width of a vehicle in a hall.
 _HIDDEN_M = 1.0
@@ -27,35 +27,31 @@ LEAST_AHEAD_M = 0.3
 _MIN_INWARDS_MPS = 0.3
 
 
-def with_hidden_near_sides(
-    boxes: Bodies, pose: PlanarPose, mount: CameraMount, front_m: float, edges: ViewEdges
-) -> Bodies:
+def with_hidden_near_sides(boxes: Bodies, view: CurrentView, front_m: float) -> Bodies:
     """The boxes, those of movers that come in over the edge of the view extended towards the robot.
 
     front_m: from the robot's turning centre to its foremost point.
     """
     if not np.count_nonzero(boxes.moving):
         return boxes
-    hidden_m = _hidden(boxes, pose, mount, edges, max(front_m - mount.forward_m + LEAST_AHEAD_M, 0.0))
+    hidden_m = _hidden(boxes, view, max(front_m - view.forward_m + LEAST_AHEAD_M, 0.0))
     if not np.count_nonzero(hidden_m):
         return boxes
-    return extended_towards(boxes, hidden_m, pose.heading_rad)
+    return extended_towards(boxes, hidden_m, view.heading_rad)
 
 
-@compiled(Bodies, PlanarPose, CameraMount, ViewEdges, "float64")
-def _hidden(
-    bodies: Bodies, pose: PlanarPose, mount: CameraMount, edges: ViewEdges, least_m: float
-) -> FloatArray:
+@compiled(Bodies, CurrentView, "float64")
+def _hidden(bodies: Bodies, view: CurrentView, least_m: float) -> FloatArray:
     """(N,) by how much the bodies may extend nearer than their boxes, at most to least_m from the camera."""
-    cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
+    cos, sin = math.cos(view.heading_rad), math.sin(view.heading_rad)
     hidden_m = np.zeros(len(bodies.moving))
     for k in range(len(hidden_m)):
-        ahead_m, left_m = ahead_and_left(bodies.xy_m[k], pose, mount)
+        ahead_m, left_m = ahead_and_left(bodies.xy_m[k], view)
         near_m, inner_m = ahead_m - bodies.half_view_m[k], abs(left_m) - bodies.half_across_m[k]
         vx, vy = bodies.velocity_mps[k]
         along_mps, leftward_mps = along_and_left(vx, vy, cos, sin)
         inwards_mps = -math.copysign(1.0, left_m) * leftward_mps
-        on_edge = reaches_side_edge(inner_m, near_m, edges)
+        on_edge = reaches_side_edge(inner_m, near_m, view)
         comes_in = inwards_mps > max(abs(along_mps), _MIN_INWARDS_MPS)
         if bodies.moving[k] and near_m > least_m and on_edge and comes_in:
             hidden_m[k] = min(_HIDDEN_M, near_m - least_m)

@@ -62,7 +62,7 @@ class DecisionMaker:
         self._path: Path | None = None
         self._known: WorldModel | None = None
         self._camera_limits = CameraLimits(config, robot, mount, self._latency_s)
-        self._speed_limits = SpeedLimits(config, robot.limits, mount)
+        self._speed_limits = SpeedLimits(config, robot.limits)
         self._gate, self._start_delay = ReleaseGate(config.release), StartDelay()
         self._now_ns: int | None = None
         self._emergency = False

@@ -50,10 +50,10 @@ from controller.decision.unseen_motion import (
 )
 from controller.decision.unseen_position import extrapolated, pushed_out_of_view
 from controller.decision.velocity_filter import missing_to_walking
-from controller.decision.view_edges import ViewEdges, out_of_view
+from controller.decision.view_edges import CurrentView, out_of_view
 from hal.clocks import NS_PER_S
 from hal.compiled import compiled
-from hal.types import CameraMount, FloatArray, PlanarPose
+from hal.types import FloatArray
 from vision.scene import FreeSpace
 
 BoolArray = NDArray[np.bool_]
@@ -74,10 +74,9 @@ class OutOfView:
     max_obstacle_speed_mps: measured speeds far above it (IMPLAUSIBLE_SPEED_FACTOR times) are mistakes.
     """
 
-    def __init__(self, mount: CameraMount, max_obstacle_speed_mps: float) -> None:
-        self._mount = mount
+    def __init__(self, max_obstacle_speed_mps: float) -> None:
         self._mistaken_mps = IMPLAUSIBLE_SPEED_FACTOR * max_obstacle_speed_mps
-        self._seen_through = SeenThrough(mount)
+        self._seen_through = SeenThrough()
         self._bodies = no_bodies(0)
         self._since_s: FloatArray = np.zeros(0)
         self._stands_since_ns: int | None = None
@@ -85,7 +84,7 @@ class OutOfView:
         self._approached: dict[int, tuple[int, FloatArray]] = {}
         self._widest_of, self._widest_half_m = np.zeros(0, np.int64), np.zeros(0)
 
-    def mark_leaving_movers(self, seen: Bodies, pose: PlanarPose, edges: ViewEdges) -> Bodies:
+    def mark_leaving_movers(self, seen: Bodies, view: CurrentView) -> Bodies:
         """The seen bodies, of which some that are judged standing are made moving.
 
         These are the ones that approached the robot's axis when last seen or just before, which perception
@@ -97,13 +96,13 @@ class OutOfView:
         # The edge of the view cuts bodies off, so the present width says little.
         self._widest_half_m = _widest(seen.ids, seen.half_across_m, self._widest_of, self._widest_half_m)
         self._widest_of = seen.ids
-        out, comes = unseen_or_approaching(seen, self._widest_half_m, pose)
+        out, comes = unseen_or_approaching(seen, self._widest_half_m, view)
         if not self._approached and not np.count_nonzero(comes):
             return seen
         self._approached = self._lately_approached(seen, out, comes)
         ids = seen.ids.tolist()
         came = np.array([one in self._approached for one in ids], np.bool_)
-        leaves = out & came & out_of_view(seen, pose, self._mount, edges)
+        leaves = out & came & out_of_view(seen, view)
         if not np.count_nonzero(leaves):
             return seen
         velocity = seen.velocity_mps.copy()
@@ -113,13 +112,7 @@ class OutOfView:
         return replace(seen, velocity_mps=velocity, innovation_mps=innovation, moving=moving)
 
     def update(
-        self,
-        before: Bodies,
-        seen: Bodies,
-        pose: PlanarPose,
-        edges: ViewEdges,
-        standing: bool,
-        free: FreeSpace,
+        self, before: Bodies, seen: Bodies, view: CurrentView, standing: bool, free: FreeSpace
     ) -> Bodies:
         """The bodies out of view that count in addition to seen.
 
@@ -130,25 +123,25 @@ class OutOfView:
         dt_s = (seen.captured_ns - before.captured_ns) / NS_PER_S
         if not standing or self._stands_since_ns is None:
             self._stands_since_ns = seen.captured_ns if standing else None
-        bodies, since_s = self._with_missing(before, seen, dt_s, pose, edges)
+        bodies, since_s = self._with_missing(before, seen, dt_s, view)
         if not len(bodies):
             self._seen_through.forget()
             return no_bodies(seen.captured_ns)
         some_move = np.count_nonzero(bodies.moving) > 0
-        xy_m = extrapolated(bodies, dt_s, pose, self._mount) if some_move else bodies.xy_m
+        xy_m = extrapolated(bodies, dt_s, view) if some_move else bodies.xy_m
         bodies = bodies.moved_to(seen.captured_ns, xy_m, bodies.unseen_s + dt_s)
-        out = out_of_view(bodies, pose, self._mount, edges)
-        out |= unproven(bodies, pose, self._mount, edges, free)
-        kept = self._still_there(bodies, since_s, seen, out, pose)
+        out = out_of_view(bodies, view)
+        out |= unproven(bodies, view, free)
+        kept = self._still_there(bodies, since_s, seen, out, view)
         if standing:
-            kept &= ~self._seen_through.seen_empty(bodies, pose, edges, free)
+            kept &= ~self._seen_through.seen_empty(bodies, view, free)
         else:
             self._seen_through.forget()
         if np.count_nonzero(kept) < len(kept):
             since_s, bodies = since_s[kept], bodies.select(kept)
         self._since_s = since_s
         if some_move:
-            bodies = pushed_out_of_view(bodies, since_s, pose, self._mount, edges, free)
+            bodies = pushed_out_of_view(bodies, since_s, view, free)
         self._bodies = bodies
         return bodies
 
@@ -167,7 +160,7 @@ class OutOfView:
         return lately
 
     def _with_missing(
-        self, before: Bodies, seen: Bodies, dt_s: float, pose: PlanarPose, edges: ViewEdges
+        self, before: Bodies, seen: Bodies, dt_s: float, view: CurrentView
     ) -> tuple[Bodies, FloatArray]:
         """The bodies kept so far, then those of before that are missing in seen; and since when, in seconds.
 
@@ -179,7 +172,7 @@ class OutOfView:
         if not np.count_nonzero(missing):
             return bodies, since_s
         gone = with_measured_velocity(before.select(missing), self._mistaken_mps)
-        stopped = stopped_below_view(gone, pose, self._mount, edges)
+        stopped = stopped_below_view(gone, view)
         stood = stopped | (~gone.moving & self._last_seen_driving(gone))
         if np.count_nonzero(stopped):
             velocity = np.where(stopped[:, None], 0.0, gone.velocity_mps)
@@ -199,13 +192,13 @@ class OutOfView:
         return np.asarray(bodies.captured_ns - bodies.unseen_s * NS_PER_S <= self._stands_since_ns)
 
     def _still_there(
-        self, bodies: Bodies, since_s: FloatArray, seen: Bodies, out: BoolArray, pose: PlanarPose
+        self, bodies: Bodies, since_s: FloatArray, seen: Bodies, out: BoolArray, view: CurrentView
     ) -> BoolArray:
         """(N,) which bodies, last seen since_s ago (N,), are out of view (N,) and not part of a seen one.
 
         Movers are kept for a limited time only.
         """
-        kept = _still_kept(bodies, since_s, seen, out, pose)
+        kept = _still_kept(bodies, since_s, seen, out, view)
         if not np.count_nonzero(bodies.moving):
             return kept
         kept &= ~first_strips(bodies, since_s, seen)
@@ -237,16 +230,16 @@ def _parts_of_movers(gone: Bodies, seen: Bodies) -> BoolArray:
     return parts
 
 
-@compiled(Bodies, "float64[:]", Bodies, "boolean[:]", PlanarPose)
+@compiled(Bodies, "float64[:]", Bodies, "boolean[:]", CurrentView)
 def _still_kept(
-    bodies: Bodies, since_s: FloatArray, seen: Bodies, out: BoolArray, pose: PlanarPose
+    bodies: Bodies, since_s: FloatArray, seen: Bodies, out: BoolArray, view: CurrentView
 ) -> BoolArray:
     """(N,) as OutOfView._still_there(), leftover strips included."""
     covered = covering(seen, bodies.xy_m, bodies.half_view_m, _SAME_PLACE_M)
     kept = out.copy()
     for k in range(len(kept)):
         moving = bodies.moving[k]
-        if moving and since_s[k] > (_MAY_ENTER_KEPT_S if may_enter_way(bodies, k, pose) else _MOVING_KEPT_S):
+        if moving and since_s[k] > (_MAY_ENTER_KEPT_S if may_enter_way(bodies, k, view) else _MOVING_KEPT_S):
             kept[k] = False
         for m in range(len(seen.ids)):
             part_of = covered[k, m] and (not moving or agrees(bodies, k, seen, m))

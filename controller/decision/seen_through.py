@@ -16,10 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.decision.bodies import Bodies
-from controller.decision.view_edges import ViewEdges, ahead_and_left, is_beyond_edges
+from controller.decision.view_edges import CurrentView, ahead_and_left, is_below_or_above_view
 from hal.compiled import compiled, inlined
 from hal.geometry import wrap_angle_rad
-from hal.types import CameraMount, PlanarPose
 from vision.scene import FreeSpace
 
 # Only bodies this far inside the side edges are judged: a smaller distance may be an error of the robot's
@@ -42,8 +41,7 @@ _STANDS_RAD = math.radians(0.25)
 class SeenThrough:
     """Keeps, by body id, since when its place has been seen empty, and the heading from which."""
 
-    def __init__(self, mount: CameraMount) -> None:
-        self._mount = mount
+    def __init__(self) -> None:
         self._since_ns: dict[int, int] = {}
         self._heading_rad = math.nan
 
@@ -51,15 +49,13 @@ class SeenThrough:
         """Start anew: the robot drives, or nothing is remembered."""
         self._since_ns.clear()
 
-    def seen_empty(
-        self, bodies: Bodies, pose: PlanarPose, edges: ViewEdges, free: FreeSpace
-    ) -> NDArray[np.bool_]:
-        """(N,) which bodies are no longer there, for a robot that stands at pose. Call once a scene."""
-        if not abs(wrap_angle_rad(pose.heading_rad - self._heading_rad)) <= _STANDS_RAD:
+    def seen_empty(self, bodies: Bodies, view: CurrentView, free: FreeSpace) -> NDArray[np.bool_]:
+        """(N,) which bodies are no longer there, for a robot that stands. Call once a scene."""
+        if not abs(wrap_angle_rad(view.heading_rad - self._heading_rad)) <= _STANDS_RAD:
             self.forget()
-            self._heading_rad = pose.heading_rad
+            self._heading_rad = view.heading_rad
         now_ns, ids = bodies.captured_ns, bodies.ids.tolist()
-        empty = _seen_empty(bodies, pose, self._mount, edges, free).tolist()
+        empty = _seen_empty(bodies, view, free).tolist()
         self._since_ns = {
             track_id: self._since_ns.get(track_id, now_ns)
             for track_id, gone in zip(ids, empty, strict=True)
@@ -92,41 +88,37 @@ def _covered_bands(
     return covered, seen_free, there
 
 
-@compiled(Bodies, PlanarPose, CameraMount, ViewEdges, FreeSpace)
-def _seen_empty(
-    bodies: Bodies, pose: PlanarPose, mount: CameraMount, edges: ViewEdges, free: FreeSpace
-) -> NDArray[np.bool_]:
+@compiled(Bodies, CurrentView, FreeSpace)
+def _seen_empty(bodies: Bodies, view: CurrentView, free: FreeSpace) -> NDArray[np.bool_]:
     """(N,) which standing bodies are well in view, and all bands that they cover are seen free."""
     empty = np.zeros(len(bodies.moving), np.bool_)
     for k in range(len(empty)):
-        ahead, left = ahead_and_left(bodies.xy_m[k], pose, mount)
+        ahead, left = ahead_and_left(bodies.xy_m[k], view)
         near = ahead - bodies.half_view_m[k]
-        inside = abs(left) + bodies.half_across_m[k] <= edges.edge_tan * near - _WELL_INSIDE_M
+        inside = abs(left) + bodies.half_across_m[k] <= view.edge_tan * near - _WELL_INSIDE_M
         if bodies.moving[k] or not (near > 0.0 and inside):
             continue
-        if not is_beyond_edges(bodies, k, near, mount.height_m, edges):
+        if not is_below_or_above_view(bodies, k, near, view):
             covered, seen_free, _ = _covered_bands(bodies, k, ahead, left, free)
             empty[k] = 0 < covered == seen_free
     return empty
 
 
-@compiled(Bodies, PlanarPose, CameraMount, ViewEdges, FreeSpace)
-def unproven(
-    bodies: Bodies, pose: PlanarPose, mount: CameraMount, edges: ViewEdges, free: FreeSpace
-) -> NDArray[np.bool_]:
+@compiled(Bodies, CurrentView, FreeSpace)
+def unproven(bodies: Bodies, view: CurrentView, free: FreeSpace) -> NDArray[np.bool_]:
     """(N,) which bodies that surely stood are in view and near, but their place is not seen in this scene.
 
     It is seen if every band that the body covers is free beyond it, or if one ends at a surface there.
     """
     unseen = np.zeros(len(bodies.moving), np.bool_)
     for k in range(len(unseen)):
-        ahead, left = ahead_and_left(bodies.xy_m[k], pose, mount)
+        ahead, left = ahead_and_left(bodies.xy_m[k], view)
         near = ahead - bodies.half_view_m[k]
         speed_mps = math.hypot(bodies.measured_mps[k, 0], bodies.measured_mps[k, 1])
         stood = not bodies.moving[k] and bodies.tracked_s[k] >= _STOOD_S and speed_mps <= _STOOD_MPS
         if not (stood and 0.0 < near <= _NEAR_M):
             continue
-        if not is_beyond_edges(bodies, k, near, mount.height_m, edges):
+        if not is_below_or_above_view(bodies, k, near, view):
             covered, seen_free, there = _covered_bands(bodies, k, ahead, left, free)
             unseen[k] = not there and seen_free < covered
     return unseen

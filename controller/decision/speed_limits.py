@@ -48,7 +48,6 @@ from controller.decision.standing_limits import StandingLimits
 from controller.decision.watched import Watch
 from controller.decision.world_model import WorldModel
 from controller.decision.worst_case_limit import WorstCase
-from hal.types import CameraMount
 
 _COARSE_S = 0.5  # step of the times beyond those of the worst case
 # A surface within this distance of a tracked obstacle, along the path and across it, is named after it.
@@ -64,14 +63,14 @@ _INSIDE = (
 class SpeedLimits:
     """Asks the advisers, in this order: depth, standing bodies, moving bodies, and the worst case."""
 
-    def __init__(self, config: DecisionConfig, limits: Limits, mount: CameraMount) -> None:
+    def __init__(self, config: DecisionConfig, limits: Limits) -> None:
         self._config, self._comfort = config, braking.comfort(limits)
         self._worst_case = WorstCase(config, limits)
         fine = self._worst_case.times_s
         coarse = np.arange(fine[-1] + _COARSE_S, config.prediction.horizon_s + _COARSE_S, _COARSE_S)
         times_s = np.concatenate((fine, coarse))
         self._inside: set[int] = set()
-        self._standing = StandingLimits(config, limits, mount, self._inside)
+        self._standing = StandingLimits(config, limits, self._inside)
         self._moving = MovingLimits(config, limits, times_s, self._inside)
         self._watch = Watch(config, times_s)
         self._taken_from: Bodies | None = None

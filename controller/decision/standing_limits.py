@@ -30,7 +30,7 @@ from controller.decision.view_edges import visible_from_m
 from controller.decision.world_model import WorldModel
 from hal.compiled import compiled
 from hal.records import record
-from hal.types import CameraMount, FloatArray
+from hal.types import FloatArray
 
 # Beside the robot (its front is past the near side) only a body this far inside the corridor counts.
 _INSIDE_BODY_M = 0.05
@@ -72,8 +72,8 @@ class StandingLimits:
     start and stop. Standing bodies are placed once a scene, not once a step.
     """
 
-    def __init__(self, config: DecisionConfig, limits: Limits, mount: CameraMount, inside: set[int]) -> None:
-        self._config, self._limits, self._mount = config, limits, mount
+    def __init__(self, config: DecisionConfig, limits: Limits, inside: set[int]) -> None:
+        self._config, self._limits = config, limits
         self._comfort, self._emergency = braking.comfort(limits), braking.emergency(limits)
         self._inside = inside
         self._taken_from: Bodies | None = None
@@ -183,11 +183,11 @@ class StandingLimits:
 
         Never less than the configured stop_m, even if a camera that looks down steeply would see it nearer.
         """
-        visible_m = visible_from_m(bodies, placed.d_m[:, 0], self._mount.height_m, known.edges)
-        front_m = known.corridor.front_m - self._mount.forward_m
-        stop_m = self._config.margins.stop_m
+        view, stop_m = known.view, self._config.margins.stop_m
+        visible_m = visible_from_m(bodies, placed.d_m[:, 0], view)
+        front_m = known.corridor.front_m - view.forward_m
         return _stop_distances(
-            visible_m, bodies.bottom_m, self._mount.height_m, front_m, stop_m, max(known.edges.near_m, stop_m)
+            visible_m, bodies.bottom_m, view.height_m, front_m, stop_m, max(view.near_m, stop_m)
         )
 
     def _may_wait(self, gap: Gap, motion: Motion, age_s: float) -> bool:

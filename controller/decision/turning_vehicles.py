@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from controller.decision.bodies import Bodies, extended_towards
 from controller.decision.cut_movers import LEAST_AHEAD_M
-from controller.decision.view_edges import ViewEdges, ahead_and_left, reaches_side_edge
+from controller.decision.view_edges import CurrentView, ahead_and_left, reaches_side_edge
 from hal.clocks import NS_PER_S
 from hal.compiled import compiled, inlined
 from hal.records import record
-from hal.types import CameraMount, FloatArray, Integers, Matrix, PlanarPose, Vector
+from hal.types import FloatArray, Integers, Matrix, Vector
 
 # Of half its length, as seen from the side. A rectangle turns within the circle through its corners: one of
 # 2.4 x 1.15 m comes nearer by 0.63 of half its length, one of 4.3 x 1.8 m by 0.66.
@@ -84,28 +84,28 @@ class TurningVehicles:
         size_m = np.zeros(0)
         self._known = _Known(nobody, np.zeros((0, 2)), nobody, nobody, size_m, nobody, size_m, size_m)
 
-    def swing_m(self, seen: Bodies, pose: PlanarPose, mount: CameraMount, edges: ViewEdges) -> FloatArray:
+    def swing_m(self, seen: Bodies, view: CurrentView) -> FloatArray:
         """(N,) by how much more than the margin allows the ends of the tracks of a scene may come nearer.
 
-        0 for whatever is no vehicle that has moved lately and is slow now. pose: of the robot, at the scene.
+        0 for whatever is no vehicle that has moved lately and is slow now.
         """
-        cut = _cut_by_view(seen, pose, mount, edges)
+        cut = _cut_by_view(seen, view)
         known = _Known(seen.ids, seen.xy_m, *_updated(self._known, seen, cut))
         swing_m = _swings(known, seen, self._swing_allowed_m)
         self._known = known.followed_by(self._known, _lost(self._known, seen).nonzero()[0])
         return swing_m
 
 
-def with_swinging_ends(boxes: Bodies, swing_m: FloatArray, pose: PlanarPose, front_m: float) -> Bodies:
+def with_swinging_ends(boxes: Bodies, swing_m: FloatArray, view: CurrentView, front_m: float) -> Bodies:
     """The boxes (N) extended towards the robot by swing_m (N,), but not up to its front.
 
     front_m: from the robot's turning centre to its foremost point.
     """
     if not np.count_nonzero(swing_m):
         return boxes
-    ahead_m = (boxes.xy_m - (pose.x_m, pose.y_m)) @ (math.cos(pose.heading_rad), math.sin(pose.heading_rad))
+    ahead_m = (boxes.xy_m - (view.x_m, view.y_m)) @ (math.cos(view.heading_rad), math.sin(view.heading_rad))
     room_m = ahead_m - boxes.half_view_m - front_m - LEAST_AHEAD_M
-    return extended_towards(boxes, np.minimum(swing_m, np.maximum(room_m, 0.0)), pose.heading_rad)
+    return extended_towards(boxes, np.minimum(swing_m, np.maximum(room_m, 0.0)), view.heading_rad)
 
 
 @inlined
@@ -133,13 +133,13 @@ def _row_around(known: _Known, xy_m: FloatArray, now_ns: int) -> int:
     return -1
 
 
-@compiled(Bodies, PlanarPose, CameraMount, ViewEdges)
-def _cut_by_view(seen: Bodies, pose: PlanarPose, mount: CameraMount, edges: ViewEdges) -> NDArray[np.bool_]:
+@compiled(Bodies, CurrentView)
+def _cut_by_view(seen: Bodies, view: CurrentView) -> NDArray[np.bool_]:
     """(N,) which tracks may go on beyond a side edge of the view."""
     cut = np.empty(len(seen.ids), np.bool_)
     for k in range(len(cut)):
-        ahead_m, left_m = ahead_and_left(seen.xy_m[k], pose, mount)
-        cut[k] = reaches_side_edge(abs(left_m) + seen.half_across_m[k], ahead_m, edges)
+        ahead_m, left_m = ahead_and_left(seen.xy_m[k], view)
+        cut[k] = reaches_side_edge(abs(left_m) + seen.half_across_m[k], ahead_m, view)
     return cut
 
 

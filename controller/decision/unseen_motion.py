@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.decision.bodies import Bodies
-from controller.decision.view_edges import ViewEdges, ahead_and_left, is_below_view
+from controller.decision.view_edges import CurrentView, ahead_and_left, is_below_view
 from hal.compiled import compiled, inlined
 from hal.directions import along_and_left
-from hal.types import CameraMount, FloatArray, PlanarPose
+from hal.types import FloatArray
 
 BoolArray = NDArray[np.bool_]
 
@@ -63,18 +63,18 @@ def leftward_variance(covariance: FloatArray, cos: float, sin: float) -> float:
     return float((covariance[0, 0] * sin - mixed * cos) * sin + covariance[1, 1] * cos * cos)
 
 
-@compiled(Bodies, "float64[:]", PlanarPose)
+@compiled(Bodies, "float64[:]", CurrentView)
 def unseen_or_approaching(
-    bodies: Bodies, widest_half_m: FloatArray, pose: PlanarPose
+    bodies: Bodies, widest_half_m: FloatArray, view: CurrentView
 ) -> tuple[BoolArray, BoolArray]:
     """Two masks (N,) of the bodies judged standing: not seen in this scene; and seen, but approaching.
 
-    Approaching: the measured velocity towards the axis of a robot at pose (the line straight ahead) exceeds
+    Approaching: the measured velocity towards the robot's axis (the line straight ahead of it) exceeds
     the noise; of a body as tall as a person, less suffices. A body is in neither mask if it was tracked for
     MIN_TRACKED_S or less, or was never wider than MIN_MOVER_HALF_WIDTH_M. widest_half_m (N,): half of the
     greatest width that each was seen with.
     """
-    cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
+    cos, sin = math.cos(view.heading_rad), math.sin(view.heading_rad)
     out, comes = np.zeros(len(bodies.moving), np.bool_), np.zeros(len(bodies.moving), np.bool_)
     for k in range(len(out)):
         # tracked_s and not age_s: the velocity of a new track was hardly measured, however long something
@@ -83,7 +83,7 @@ def unseen_or_approaching(
         if bodies.moving[k] or hardly_tracked or widest_half_m[k] <= MIN_MOVER_HALF_WIDTH_M:
             continue
         out[k] = bodies.unseen_s[k] > 0.0
-        _, left_m = along_and_left(bodies.xy_m[k, 0] - pose.x_m, bodies.xy_m[k, 1] - pose.y_m, cos, sin)
+        _, left_m = along_and_left(bodies.xy_m[k, 0] - view.x_m, bodies.xy_m[k, 1] - view.y_m, cos, sin)
         vx, vy = bodies.measured_mps[k]
         _, leftward_mps = along_and_left(vx, vy, cos, sin)
         variance = leftward_variance(bodies.covariance[k], cos, sin)
@@ -96,14 +96,14 @@ def unseen_or_approaching(
 
 
 @inlined
-def may_enter_way(bodies: Bodies, k: int, pose: PlanarPose) -> bool:
+def may_enter_way(bodies: Bodies, k: int, view: CurrentView) -> bool:
     """Whether body k may come into the robot's way.
 
     That is, it moves towards the robot's axis from either side, or along with the robot (more than
     _ALONG_TO_OUTWARD_RATIO times as fast forward as outwards), from where it may cut in.
     """
-    cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
-    _, left_m = along_and_left(bodies.xy_m[k, 0] - pose.x_m, bodies.xy_m[k, 1] - pose.y_m, cos, sin)
+    cos, sin = math.cos(view.heading_rad), math.sin(view.heading_rad)
+    _, left_m = along_and_left(bodies.xy_m[k, 0] - view.x_m, bodies.xy_m[k, 1] - view.y_m, cos, sin)
     vx, vy = bodies.velocity_mps[k]
     forward_mps, leftward_mps = along_and_left(vx, vy, cos, sin)
     towards_axis = left_m * leftward_mps < 0.0
@@ -134,9 +134,9 @@ def _squared_and_variance(velocity_mps: FloatArray, covariance: FloatArray) -> t
     return x * x + y * y, x * covariance[0, 0] * x + x * mixed * y + y * covariance[1, 1] * y
 
 
-@compiled(Bodies, PlanarPose, CameraMount, ViewEdges)
-def stopped_below_view(bodies: Bodies, pose: PlanarPose, mount: CameraMount, edges: ViewEdges) -> BoolArray:
-    """(N,) which movers are below the view, ahead of a camera at pose, and hardly moved when last seen.
+@compiled(Bodies, CurrentView)
+def stopped_below_view(bodies: Bodies, view: CurrentView) -> BoolArray:
+    """(N,) which movers are below the view, ahead of the camera, and hardly moved when last seen.
 
     A verdict takes some frames: what has stopped still counts as moving when it sinks below the view. Their
     speed was within _AT_REST_SIGMAS standard deviations of 0, and at most _AT_REST_MPS. Nothing is said of
@@ -144,14 +144,14 @@ def stopped_below_view(bodies: Bodies, pose: PlanarPose, mount: CameraMount, edg
     """
     stopped = np.zeros(len(bodies.moving), np.bool_)
     for k in range(len(stopped)):
-        ahead, left = ahead_and_left(bodies.xy_m[k], pose, mount)
+        ahead, left = ahead_and_left(bodies.xy_m[k], view)
         near = ahead - bodies.half_view_m[k]
         hardly_tracked = bodies.tracked_s[k] <= MIN_TRACKED_S
-        if not bodies.moving[k] or hardly_tracked or abs(left) > edges.edge_tan * ahead:
+        if not bodies.moving[k] or hardly_tracked or abs(left) > view.edge_tan * ahead:
             continue
         squared, variance = _squared_and_variance(bodies.velocity_mps[k], bodies.covariance[k])
         at_rest = squared <= _AT_REST_MPS**2 and squared**2 <= _AT_REST_SIGMAS**2 * variance
-        stopped[k] = at_rest and is_below_view(bodies, k, near, mount.height_m, edges)
+        stopped[k] = at_rest and is_below_view(bodies, k, near, view)
     return stopped
 
 

@@ -16,14 +16,14 @@ from controller.decision.unseen_motion import leftward_variance, significant_com
 from controller.decision.view_edges import (
     EDGE_TOLERANCE_M,
     EDGE_TOLERANCE_MPS,
-    ViewEdges,
+    CurrentView,
     ahead_and_left,
     all_ahead_and_left,
-    beyond_edges,
+    below_or_above_view,
 )
 from hal.compiled import compiled
 from hal.directions import along_and_left
-from hal.types import CameraMount, FloatArray, PlanarPose
+from hal.types import FloatArray
 from vision.scene import FreeSpace
 
 _MIN_AXIS_DISTANCE_M = 0.1  # least distance from the camera's axis of a mover that was not seen to come in
@@ -32,19 +32,19 @@ _VELOCITY_CHANGE_MPS2 = 0.25
 _ROUNDING = 1e-6
 
 
-@compiled(Bodies, "float64", PlanarPose, CameraMount)
-def extrapolated(bodies: Bodies, dt_s: float, pose: PlanarPose, mount: CameraMount) -> FloatArray:
+@compiled(Bodies, "float64", CurrentView)
+def extrapolated(bodies: Bodies, dt_s: float, view: CurrentView) -> FloatArray:
     """(N, 2) the positions dt_s later at constant velocity.
 
     A mover ahead of the camera that approaches its axis (by more than one standard deviation of the
     sideways velocity) stays at least _MIN_AXIS_DISTANCE_M on its own side: had it crossed, it would have
     been seen.
     """
-    cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
+    cos, sin = math.cos(view.heading_rad), math.sin(view.heading_rad)
     xy = np.empty(bodies.xy_m.shape)
     for k in range(len(xy)):
         vx, vy = bodies.velocity_mps[k]
-        ahead, left = ahead_and_left(bodies.xy_m[k], pose, mount)
+        ahead, left = ahead_and_left(bodies.xy_m[k], view)
         _, leftward_mps = along_and_left(vx, vy, cos, sin)
         side, before_camera = -1.0 if left < 0.0 else 1.0, ahead - bodies.half_view_m[k] > 0.0
         variance = leftward_variance(bodies.covariance[k], cos, sin)
@@ -56,14 +56,7 @@ def extrapolated(bodies: Bodies, dt_s: float, pose: PlanarPose, mount: CameraMou
     return xy
 
 
-def pushed_out_of_view(
-    bodies: Bodies,
-    since_s: FloatArray,
-    pose: PlanarPose,
-    mount: CameraMount,
-    edges: ViewEdges,
-    free: FreeSpace,
-) -> Bodies:
+def pushed_out_of_view(bodies: Bodies, since_s: FloatArray, view: CurrentView, free: FreeSpace) -> Bodies:
     """The bodies, with movers whose expected place is seen to be free moved outwards, out of the view.
 
     They are moved sideways to the edge of the free space, and a velocity towards the axis is replaced by
@@ -71,11 +64,11 @@ def pushed_out_of_view(
     until it is late by EDGE_TOLERANCE_M plus EDGE_TOLERANCE_MPS for each second since it was last seen.
     since_s (N,): for how long each has been out of view.
     """
-    cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
+    cos, sin = math.cos(view.heading_rad), math.sin(view.heading_rad)
     forward, leftward = np.array([cos, sin]), np.array([-sin, cos])
-    ahead, left = all_ahead_and_left(bodies.xy_m, pose, mount)
+    ahead, left = all_ahead_and_left(bodies.xy_m, view)
     near, far = ahead - bodies.half_view_m, ahead + bodies.half_view_m
-    within = bodies.moving & (near > 0.0) & ~beyond_edges(bodies, near, mount.height_m, edges)
+    within = bodies.moving & (near > 0.0) & ~below_or_above_view(bodies, near, view)
     if not np.count_nonzero(within):
         return bodies
     side = np.where(left < 0.0, -1.0, 1.0)

@@ -34,7 +34,7 @@ from controller.decision.situation import SceneError
 from controller.decision.surfaces import NO_SURFACES, check_scan, surfaces_of
 from controller.decision.turning_vehicles import TurningVehicles, with_swinging_ends
 from controller.decision.velocity_filter import SteadyVelocities
-from controller.decision.view_edges import ViewEdges
+from controller.decision.view_edges import CurrentView, view_from
 from controller.path.path import OnPath, Path
 from hal.clocks import NS_PER_S
 from hal.compiled import compiled
@@ -48,6 +48,9 @@ _MAX_BOX_HALF_M = 0.8
 # centimetre or two wide, different ones in each frame. Poles are wider.
 _MIN_BOX_HALF_WIDTH_M = 0.015
 _FUTURE_S = 0.005  # tolerance of the scene's time stamp
+# Until a scene tells where the view ends to the sides; that of an ordinary camera.
+_EDGE_TAN = 0.5
+_UNKNOWN_POSE = PlanarPose(math.nan, math.nan, math.nan)
 _GOOD = CameraHealth(CameraCondition.GOOD, "", float("nan"))
 
 
@@ -62,7 +65,7 @@ class WorldModel:
     corridor: the floor that the robot sweeps along the path.
     sight: how much of the corridor was seen free, and the nearest unexplained surface in it.
     lens: whether something is too near to the lens to be seen.
-    edges: of the camera's view.
+    view: what the camera had in view in that scene.
     age_s: time since the newest scene was captured; inf: none yet.
     since_s: time since the scene of bodies was captured, the last one of a trustworthy camera; inf: none yet.
     health: of the camera in the newest scene.
@@ -93,8 +96,8 @@ class WorldModel:
         self._unboxed: Bodies | None = None
         self._boxes = no_bodies(0)
         self._velocity_filter = SteadyVelocities()
-        self._out_of_view = OutOfView(mount, robot.limits.max_obstacle_speed_mps)
-        self.edges = ViewEdges(edge_tan=0.5, near_m=config.sight.near_m, up_tan=math.inf)
+        self._out_of_view = OutOfView(robot.limits.max_obstacle_speed_mps)
+        self.view = view_from(_UNKNOWN_POSE, mount, _EDGE_TAN, config.sight.near_m, math.inf)
         self._known_places = KnownPlaces()
         self._lately_moved = LatelyMoved()
         self.pausing: NDArray[np.bool_] = np.zeros(0, np.bool_)
@@ -119,7 +122,7 @@ class WorldModel:
         self._known_places, self._turning = before._known_places, before._turning
         self._lately_moved, self.pausing = before._lately_moved, before.pausing
         self._poses, self.surfaces, self.lens = before._poses, before.surfaces, before.lens
-        self.health, self.edges = before.health, before.edges
+        self.health, self.view = before.health, before.view
         self._captured_ns, self._scene_fault = before._captured_ns, before._scene_fault
 
     @property
@@ -183,17 +186,17 @@ class WorldModel:
         except SceneError as error:
             return str(error)
         free, s_m = scene.free_space, self.corridor.path.project(pose, on_path.s_m).s_m
-        self.edges = edges = self._edges_of(free)
-        swing_m = self._turning.swing_m(seen, pose, self._mount, edges)
+        self.view = view = self._view_of(free, pose)
+        swing_m = self._turning.swing_m(seen, view)
         boxed = _boxed(seen.half_view_m, seen.half_across_m, seen.moving) | (swing_m > 0.0)
         self.surfaces = surfaces = surfaces_of(free, pose, self._mount, self._noise)
         boxes = self._known_places.without_newcomers(seen.select(boxed), seen.ids)
         boxes = self._velocity_filter.update(boxes)
-        boxes = self._out_of_view.mark_leaving_movers(boxes, pose, edges)
+        boxes = self._out_of_view.mark_leaving_movers(boxes, view)
         standing = v_mps <= STANDING_MPS
-        remembered = self._out_of_view.update(self._boxes, boxes, pose, edges, standing, free)
-        extended = with_hidden_near_sides(boxes, pose, self._mount, self.corridor.front_m, edges)
-        extended = with_swinging_ends(extended, swing_m[boxed], pose, self.corridor.front_m)
+        remembered = self._out_of_view.update(self._boxes, boxes, view, standing, free)
+        extended = with_hidden_near_sides(boxes, view, self.corridor.front_m)
+        extended = with_swinging_ends(extended, swing_m[boxed], view, self.corridor.front_m)
         self.bodies = extended.joined(remembered)
         self._boxes, self._seen, self._boxed, self._unboxed = boxes, seen, boxed, None
         self._lately_moved.look(boxes)
@@ -205,12 +208,13 @@ class WorldModel:
         self._captured_ns = scene.captured_ns
         return ""
 
-    def _edges_of(self, free: FreeSpace) -> ViewEdges:
-        """The edges of the view in a scene; to the sides, the last ones if the scene does not tell."""
-        edge_tan = self.edges.edge_tan
+    def _view_of(self, free: FreeSpace, pose: PlanarPose) -> CurrentView:
+        """The view in a scene; its side edges are the last ones if the scene does not tell."""
+        edge_tan = self.view.edge_tan
         if len(free.bearing_tan):
             edge_tan = _outermost(free.bearing_tan) + free.half_width_tan
-        return ViewEdges(edge_tan, max(self._config.sight.near_m, free.floor_from_m), free.up_tan)
+        near_m = max(self._config.sight.near_m, free.floor_from_m)
+        return view_from(pose, self._mount, edge_tan, near_m, free.up_tan)
 
 
 @compiled("float64[:], float64[:], boolean[:]")

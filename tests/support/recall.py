@@ -8,13 +8,13 @@ import numpy as np
 
 from controller.decision.bodies import Bodies, no_bodies
 from controller.decision.out_of_view import OutOfView
-from controller.decision.view_edges import ViewEdges
+from controller.decision.view_edges import view_from
 from hal.types import CameraMount, PlanarPose
 from vision.scene import FreeSpace
 
 MOUNT = CameraMount(0.4, 0.0, 0.60, 0.0)
 EDGE = 0.5
-EDGES = ViewEdges(edge_tan=EDGE, near_m=1.3, up_tan=np.inf)
+VIEW = view_from(PlanarPose(0.0, 0.0, 0.0), MOUNT, EDGE, near_m=1.3, up_tan=np.inf)
 FRAME_NS = 100_000_000
 BANDS = np.linspace(-EDGE + 0.025, EDGE - 0.025, 20)
 NOTHING_SEEN = FreeSpace(BANDS, 0.025, np.full(20, np.inf), np.zeros(20))
@@ -23,7 +23,7 @@ ALL_SEEN = FreeSpace(BANDS, 0.025, np.full(20, np.inf), np.full(20, 8.0))
 
 class Recall:
     def __init__(self) -> None:
-        self.memory = OutOfView(MOUNT, 1.5)
+        self.memory = OutOfView(1.5)
         self.before = no_bodies(0)
         self.now_ns = 0
 
@@ -37,6 +37,6 @@ class Recall:
         """The same; returns what is remembered."""
         self.now_ns += FRAME_NS
         seen = replace(bodies if bodies is not None else no_bodies(0), captured_ns=self.now_ns)
-        kept = self.memory.update(self.before, seen, PlanarPose(x_m, 0.0, 0.0), EDGES, standing, free)
+        kept = self.memory.update(self.before, seen, replace(VIEW, x_m=x_m), standing, free)
         self.before = seen
         return kept

@@ -8,18 +8,17 @@ import pytest
 
 from controller.decision.bodies import Bodies
 from controller.decision.cut_movers import with_hidden_near_sides
-from controller.decision.view_edges import ViewEdges
+from controller.decision.view_edges import view_from
 from hal.types import CameraMount, PlanarPose
 from tests.support.floor_bodies import box
 
 MOUNT = CameraMount(0.5, 0.0, 0.6, 0.0)
-EDGES = ViewEdges(edge_tan=0.7, near_m=1.3, up_tan=math.inf)
-POSE = PlanarPose(0.0, 0.0, 0.0)
+VIEW = view_from(PlanarPose(0.0, 0.0, 0.0), MOUNT, edge_tan=0.7, near_m=1.3, up_tan=math.inf)
 FRONT_M = 0.6
 
 
 def near_side_m(body: Bodies) -> float:
-    seen = with_hidden_near_sides(body, POSE, MOUNT, FRONT_M, EDGES)
+    seen = with_hidden_near_sides(body, VIEW, FRONT_M)
     return float(seen.xy_m[0, 0] - seen.half_view_m[0])
 
 
@@ -28,7 +27,7 @@ def test_a_truck_whose_far_corner_is_seen_may_begin_a_metre_nearer(side: float) 
     """The near corner of what is seen, 5 m ahead of the camera and 3.5 m aside, is on the view's edge."""
     truck = box(6.0, side * 4.0, 0.0, -side * 1.4, half_view_m=0.5, half_across_m=0.5)
     assert near_side_m(truck) == pytest.approx(4.5)
-    far_side = with_hidden_near_sides(truck, POSE, MOUNT, FRONT_M, EDGES)
+    far_side = with_hidden_near_sides(truck, VIEW, FRONT_M)
     assert float(far_side.xy_m[0, 0] + far_side.half_view_m[0]) == pytest.approx(6.5)
 
 

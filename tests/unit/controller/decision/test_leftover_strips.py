@@ -9,11 +9,9 @@ import pytest
 
 from controller.decision.bodies import Bodies, no_bodies
 from controller.decision.out_of_view import OutOfView
-from hal.types import PlanarPose
 from tests.support.floor_bodies import box
-from tests.support.recall import EDGES, FRAME_NS, MOUNT, NOTHING_SEEN
+from tests.support.recall import FRAME_NS, NOTHING_SEEN, VIEW
 
-HERE = PlanarPose(0.0, 0.0, 0.0)
 WALKER = box(2.0, 1.5, 0.0, 1.0, sigma_mps=0.1)
 
 
@@ -29,11 +27,11 @@ def strip(
 
 
 def left_behind(*bodies: Bodies) -> list[int]:
-    """The ids of who is reckoned with once all of them are out of view."""
-    view, before = OutOfView(MOUNT, 1.5), bodies[0]
+    """The ids of who is reckoned with once all of them are out of memory."""
+    memory, before = OutOfView(1.5), bodies[0]
     for one in bodies[1:]:
         before = before.joined(one)
-    kept = view.update(before, no_bodies(FRAME_NS), HERE, EDGES, False, NOTHING_SEEN)
+    kept = memory.update(before, no_bodies(FRAME_NS), VIEW, False, NOTHING_SEEN)
     return [int(one) for one in kept.ids]
 
 
@@ -86,13 +84,13 @@ def comer(y_m: float = 0.85, age_s: float = 0.6, vy_mps: float = -0.6, x_m: floa
 
 
 def expected_after(strip: Bodies, seen: Bodies, gone_s: float = 0.8) -> bool:
-    """Whether the strip is still reckoned with once seen is in view, gone_s after it has left the view."""
-    view = OutOfView(MOUNT, 1.5)
+    """Whether the strip is still reckoned with once seen is in view, gone_s after it has left the memory."""
+    memory = OutOfView(1.5)
     before, scenes = strip, round(gone_s * 1e9) // FRAME_NS
     for scene in range(1, scenes + 1):
         now_ns = scene * FRAME_NS
         now = replace(seen, captured_ns=now_ns) if scene == scenes else no_bodies(now_ns)
-        kept = view.update(before, now, HERE, EDGES, False, NOTHING_SEEN)
+        kept = memory.update(before, now, VIEW, False, NOTHING_SEEN)
         before = now
     return 2 in kept.ids
 

@@ -9,9 +9,8 @@ import pytest
 
 from controller.decision.bodies import no_bodies
 from controller.decision.out_of_view import OutOfView
-from hal.types import PlanarPose
 from tests.support.floor_bodies import box
-from tests.support.recall import ALL_SEEN, BANDS, EDGES, FRAME_NS, MOUNT, NOTHING_SEEN, Recall
+from tests.support.recall import ALL_SEEN, BANDS, FRAME_NS, NOTHING_SEEN, VIEW, Recall
 
 PALLET = box(5.0, 0.0, top_m=0.15)
 
@@ -78,8 +77,7 @@ def test_mover_out_of_view_is_extrapolated_for_two_seconds() -> None:
     assert recall.memory.update(
         recall.before,
         replace(no_bodies(0), captured_ns=recall.now_ns),
-        PlanarPose(3.7, 0, 0),
-        EDGES,
+        replace(VIEW, x_m=3.7),
         False,
         NOTHING_SEEN,
     ).xy_m[0].tolist() == pytest.approx([5.0, 0.85])
@@ -122,9 +120,9 @@ def test_mover_that_leaves_aslant_is_not_kept_longer(aside_mps: float, kept: lis
 
 
 def test_how_long_it_was_not_seen_is_counted() -> None:
-    memory, before = OutOfView(MOUNT, 1.5), box(2.0, 2.5, 0.0, -0.3)
+    memory, before = OutOfView(1.5), box(2.0, 2.5, 0.0, -0.3)
     seen = replace(no_bodies(0), captured_ns=FRAME_NS)
-    kept = memory.update(before, seen, PlanarPose(0.0, 0.0, 0.0), EDGES, False, NOTHING_SEEN)
+    kept = memory.update(before, seen, VIEW, False, NOTHING_SEEN)
     assert kept.unseen_s.tolist() == pytest.approx([0.1])
 
 

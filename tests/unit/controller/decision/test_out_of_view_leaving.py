@@ -11,7 +11,7 @@ from config.decision import DecisionConfig
 from config.robot import Limits, Robot
 from controller.decision.bodies import Bodies, no_bodies
 from controller.decision.out_of_view import OutOfView
-from controller.decision.view_edges import ViewEdges
+from controller.decision.view_edges import view_from
 from controller.decision.world_model import WorldModel
 from controller.path.path import OnPath
 from hal.types import CameraMount, PlanarPose
@@ -22,15 +22,15 @@ from vision.scene import FreeSpace, Scene
 
 EDGE = 0.5
 HERE = PlanarPose(0.0, 0.0, 0.0)
-EDGES = ViewEdges(edge_tan=EDGE, near_m=1.3, up_tan=np.inf)
+VIEW = view_from(HERE, CameraMount(0.4, 0.0, 0.60, 0.0), EDGE, near_m=1.3, up_tan=np.inf)
 FRAME_NS = 100_000_000
 NOTHING_SEEN = FreeSpace(np.zeros(1), EDGE, np.full(1, np.inf), np.zeros(1))
 # On the left edge of the view, 4 m ahead of the camera.
 AT_EDGE = box(4.4, 2.1, sigma_mps=0.1)
 
 
-def memory(max_obstacle_speed_mps: float = 1.5) -> OutOfView:
-    return OutOfView(CameraMount(0.4, 0.0, 0.60, 0.0), max_obstacle_speed_mps)
+def new_memory(max_obstacle_speed_mps: float = 1.5) -> OutOfView:
+    return OutOfView(max_obstacle_speed_mps)
 
 
 def measured(bodies: Bodies, left_mps: float, unseen_s: float = 0.0) -> Bodies:
@@ -45,8 +45,8 @@ def expected(bodies: Bodies, left_mps: float = 0.0) -> Bodies:
 
 def after(*scenes: Bodies) -> Bodies:
     """The bodies of the last of some scenes."""
-    view = memory()
-    return [view.mark_leaving_movers(scene, HERE, EDGES) for scene in scenes][-1]
+    memory = new_memory()
+    return [memory.mark_leaving_movers(scene, VIEW) for scene in scenes][-1]
 
 
 def test_approaching_body_that_leaves_the_view_counts_as_moving() -> None:
@@ -138,10 +138,10 @@ def test_mover_that_leaves_the_view_keeps_its_averaged_velocity() -> None:
 
 def kept_beside(newcomer: Bodies, remembered: Bodies) -> list[int]:
     """The ids of who is still reckoned with, after a newcomer came into view where it was expected."""
-    view = memory()
-    view.update(remembered, no_bodies(FRAME_NS), HERE, EDGES, True, NOTHING_SEEN)
+    memory = new_memory()
+    memory.update(remembered, no_bodies(FRAME_NS), VIEW, True, NOTHING_SEEN)
     newcomer = replace(newcomer, captured_ns=2 * FRAME_NS)
-    kept = view.update(no_bodies(FRAME_NS), newcomer, HERE, EDGES, True, NOTHING_SEEN)
+    kept = memory.update(no_bodies(FRAME_NS), newcomer, VIEW, True, NOTHING_SEEN)
     return [int(one) for one in kept.ids]
 
 
@@ -182,11 +182,11 @@ def test_body_that_certainly_moved_is_not_kept_as_standing(
 ) -> None:
     """Before the nose, below the view: what stands there is waited for. 6 sigmas of velocity are no noise, 4
     may be; and after a second the verdict knows better."""
-    view, pallet = memory(), box(1.6, 0.1, top_m=0.1, sigma_mps=0.1, age_s=age_s)
+    memory, pallet = new_memory(), box(1.6, 0.1, top_m=0.1, sigma_mps=0.1, age_s=age_s)
     before, kept = measured(pallet, left_mps), []
     for number in range(1, round(kept_s * 10) + 3):
         seen = replace(no_bodies(0), captured_ns=number * FRAME_NS)
-        kept.append(len(view.update(before, seen, HERE, EDGES, number > 1, NOTHING_SEEN)))
+        kept.append(len(memory.update(before, seen, VIEW, number > 1, NOTHING_SEEN)))
         before = seen
     assert kept[: round(kept_s * 10) - 1] == [1] * (round(kept_s * 10) - 1)
     assert kept[-1] == (0 if kept_s == 2.0 else 1)
@@ -195,11 +195,11 @@ def test_body_that_certainly_moved_is_not_kept_as_standing(
 def out_of_view_after(seconds: float, left_mps: float, sigma_mps: float, fastest_mps: float = 1.5) -> Bodies:
     """Of what was measured so below the view, standing by the verdict; fastest_mps: the greatest speed of any
     obstacle."""
-    view, pallet = memory(fastest_mps), box(1.6, 0.1, top_m=0.1, sigma_mps=sigma_mps, age_s=0.9)
+    memory, pallet = new_memory(fastest_mps), box(1.6, 0.1, top_m=0.1, sigma_mps=sigma_mps, age_s=0.9)
     before = measured(pallet, left_mps)
     for number in range(1, round(seconds * 10) + 1):
         seen = replace(no_bodies(0), captured_ns=number * FRAME_NS)
-        found = view.update(before, seen, HERE, EDGES, number > 1, NOTHING_SEEN)
+        found = memory.update(before, seen, VIEW, number > 1, NOTHING_SEEN)
         before = seen
     return found
 
@@ -218,10 +218,10 @@ def test_body_that_certainly_moved_goes_on_though_the_robot_stands(
 ) -> None:
     """What stands and vanishes then has gone by itself; who was going is somewhere."""
     pallet = measured(box(1.6, 0.1, top_m=0.1, sigma_mps=0.1, age_s=age_s), left_mps)
-    view = memory()
-    view.update(no_bodies(-2 * FRAME_NS), no_bodies(-FRAME_NS), HERE, EDGES, True, NOTHING_SEEN)
-    view.update(no_bodies(-FRAME_NS), pallet, HERE, EDGES, True, NOTHING_SEEN)
-    found = view.update(pallet, no_bodies(FRAME_NS), HERE, EDGES, True, NOTHING_SEEN)
+    memory = new_memory()
+    memory.update(no_bodies(-2 * FRAME_NS), no_bodies(-FRAME_NS), VIEW, True, NOTHING_SEEN)
+    memory.update(no_bodies(-FRAME_NS), pallet, VIEW, True, NOTHING_SEEN)
+    found = memory.update(pallet, no_bodies(FRAME_NS), VIEW, True, NOTHING_SEEN)
     assert found.moving.tolist() == [True] * kept
 
 
@@ -253,7 +253,7 @@ def test_new_track_where_something_stood_needs_its_own_time_of_measurement() -> 
     renumbered = replace(pallet, tracked_s=np.array([0.4]))
     for before, goes in ((pallet, True), (renumbered, False)):
         seen = replace(no_bodies(0), captured_ns=FRAME_NS)
-        found = memory().update(before, seen, HERE, EDGES, False, NOTHING_SEEN)
+        found = new_memory().update(before, seen, VIEW, False, NOTHING_SEEN)
         assert found.moving.tolist() == [goes]
 
 

@@ -221,8 +221,8 @@ def test_on_another_path_what_stands_is_placed_anew_without_a_new_scene() -> Non
     known.take_over(before)
     assert known.surfaces is before.surfaces
     assert known.health is before.health
-    assert known.edges == before.edges
-    standing = StandingLimits(DecisionConfig(), Robot().limits, MOUNT, set())
+    assert known.view == before.view
+    standing = StandingLimits(DecisionConfig(), Robot().limits, set())
     motion = Motion(0.4, 0.0, 0.2)
     assert standing.limits(before, 0.0, motion, 0.0) == []
     (limit,) = standing.limits(known, 0.0, motion, 0.0)

@@ -6,11 +6,8 @@ import pytest
 
 from controller.decision.bodies import Bodies
 from controller.decision.out_of_view import OutOfView
-from hal.types import PlanarPose
 from tests.support.floor_bodies import box
-from tests.support.recall import EDGES, FRAME_NS, MOUNT, NOTHING_SEEN
-
-HERE = PlanarPose(0.0, 0.0, 0.0)
+from tests.support.recall import FRAME_NS, NOTHING_SEEN, VIEW
 
 
 def leg(x_m: float = 2.0, y_m: float = 1.3, age_s: float = 0.3) -> Bodies:
@@ -25,9 +22,9 @@ def overtaker(vx_mps: float = 1.8, age_s: float = 0.2, half_across_m: float = 0.
 
 def kept(gone: Bodies, seen: Bodies) -> list[int]:
     """The ids of who is reckoned with out of view, after gone has gone and seen is still there."""
-    view = OutOfView(MOUNT, 1.5)
+    memory = OutOfView(1.5)
     still = seen.moved_to(FRAME_NS, seen.xy_m, seen.unseen_s)
-    found = view.update(seen.joined(gone), still, HERE, EDGES, False, NOTHING_SEEN)
+    found = memory.update(seen.joined(gone), still, VIEW, False, NOTHING_SEEN)
     return [int(one) for one in found.ids]
 
 

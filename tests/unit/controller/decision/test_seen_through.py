@@ -9,15 +9,14 @@ import pytest
 
 from controller.decision.bodies import Bodies
 from controller.decision.seen_through import SeenThrough
-from controller.decision.view_edges import ViewEdges
+from controller.decision.view_edges import view_from
 from hal.types import CameraMount, PlanarPose
 from tests.support.floor_bodies import box
 from vision.scene import FreeSpace
 
 MOUNT = CameraMount(0.4, 0.0, 0.60, 0.0)
 EDGE = 0.7
-EDGES = ViewEdges(edge_tan=EDGE, near_m=1.3, up_tan=0.4)
-AT = PlanarPose(10.0, 0.0, 0.0)
+VIEW = view_from(PlanarPose(10.0, 0.0, 0.0), MOUNT, EDGE, near_m=1.3, up_tan=0.4)
 BANDS = np.linspace(-EDGE + 0.01, EDGE - 0.01, 70)
 ALL_FREE = FreeSpace(BANDS, 0.01, np.full(70, np.inf), np.full(70, 8.0))
 UNKNOWN = FreeSpace(BANDS, 0.01, np.full(70, np.inf), np.zeros(70))
@@ -39,8 +38,7 @@ def gone_in(
         bool(
             seen_through.seen_empty(
                 replace(body, captured_ns=round(k * PERIOD_S * 1e9)),
-                replace(AT, heading_rad=heading_rad),
-                EDGES,
+                replace(VIEW, heading_rad=heading_rad),
                 one,
             ).all()
         )
@@ -49,7 +47,7 @@ def gone_in(
 
 
 def gone_after_s(body: Bodies, free: FreeSpace) -> float | None:
-    gone = gone_in(SeenThrough(MOUNT), body, [free] * 30, [0.0] * 30)
+    gone = gone_in(SeenThrough(), body, [free] * 30, [0.0] * 30)
     return gone.index(True) * PERIOD_S if True in gone else None
 
 
@@ -59,20 +57,20 @@ def test_body_is_gone_once_its_place_was_seen_free_for_half_a_second() -> None:
 
 def test_a_scene_in_which_it_is_not_seen_through_begins_anew() -> None:
     free = [ALL_FREE] * 5 + [UNKNOWN] + [ALL_FREE] * 6
-    assert gone_in(SeenThrough(MOUNT), strip(), free, [0.0] * 12) == [False] * 11 + [True]
+    assert gone_in(SeenThrough(), strip(), free, [0.0] * 12) == [False] * 11 + [True]
 
 
 def test_a_robot_that_turns_in_place_begins_anew() -> None:
     """By more than what odometry wanders; while it goes on turning, nothing is gone at all."""
     turned, turning = [0.0] * 5 + [0.01] * 6, [0.005 * k for k in range(30)]
-    assert gone_in(SeenThrough(MOUNT), strip(), [ALL_FREE] * 11, turned) == [False] * 10 + [True]
-    assert not any(gone_in(SeenThrough(MOUNT), strip(), [ALL_FREE] * 30, turning))
+    assert gone_in(SeenThrough(), strip(), [ALL_FREE] * 11, turned) == [False] * 10 + [True]
+    assert not any(gone_in(SeenThrough(), strip(), [ALL_FREE] * 30, turning))
     wandering = [0.002 * (k % 2) for k in range(6)]
-    assert gone_in(SeenThrough(MOUNT), strip(), [ALL_FREE] * 6, wandering)[-1]
+    assert gone_in(SeenThrough(), strip(), [ALL_FREE] * 6, wandering)[-1]
 
 
 def test_a_robot_that_drove_begins_anew() -> None:
-    seen_through = SeenThrough(MOUNT)
+    seen_through = SeenThrough()
     assert not any(gone_in(seen_through, strip(), [ALL_FREE] * 5, [0.0] * 5))
     seen_through.forget()
     assert gone_in(seen_through, strip(), [ALL_FREE] * 6, [0.0] * 6) == [False] * 5 + [True]

@@ -10,14 +10,14 @@ import pytest
 
 from controller.decision.bodies import Bodies, no_bodies
 from controller.decision.turning_vehicles import TurningVehicles, with_swinging_ends
-from controller.decision.view_edges import ViewEdges
+from controller.decision.view_edges import view_from
 from hal.clocks import NS_PER_S
 from hal.types import PlanarPose
 from tests.support.decision_bench import MOUNT
 from tests.support.floor_bodies import box
 
 ALLOWED_M, FRONT_M = 0.25, 0.6
-AT_START, EDGES = PlanarPose(0.0, 0.0, 0.0), ViewEdges(edge_tan=0.69, near_m=0.5, up_tan=0.4)
+VIEW = view_from(PlanarPose(0.0, 0.0, 0.0), MOUNT, edge_tan=0.69, near_m=0.5, up_tan=0.4)
 HALF_LENGTH_M = 1.2  # a fork lift, as seen from the side
 SWING_M = 0.63 * HALF_LENGTH_M - ALLOWED_M
 
@@ -44,7 +44,7 @@ def seen(
 
 
 def swing_m(vehicles: TurningVehicles, scene: Bodies) -> list[float]:
-    swings: list[float] = vehicles.swing_m(scene, AT_START, MOUNT, EDGES).tolist()
+    swings: list[float] = vehicles.swing_m(scene, VIEW).tolist()
     return swings
 
 
@@ -112,7 +112,7 @@ AHEAD_M = 4.0 - MOUNT.forward_m
 
 def at_edge(now_s: float, mps: float = 0.0, half_across_m: float = 0.55, side: int = 1) -> Bodies:
     """What is seen of a vehicle that a side edge of the view cuts."""
-    return seen(now_s, mps, half_across_m, left_m=side * (EDGES.edge_tan * AHEAD_M - half_across_m))
+    return seen(now_s, mps, half_across_m, left_m=side * (VIEW.edge_tan * AHEAD_M - half_across_m))
 
 
 @pytest.mark.parametrize("side", [-1, 1])
@@ -161,16 +161,16 @@ def test_a_track_that_begins_elsewhere_is_another_thing() -> None:
 
 
 def test_its_box_is_extended_towards_the_robot() -> None:
-    near = with_swinging_ends(seen(0.0), np.array([SWING_M]), PlanarPose(0.0, 0.0, 0.0), FRONT_M)
+    near = with_swinging_ends(seen(0.0), np.array([SWING_M]), VIEW, FRONT_M)
     assert float(near.xy_m[0, 0] - near.half_view_m[0]) == pytest.approx(3.5 - SWING_M)
     assert float(near.xy_m[0, 0] + near.half_view_m[0]) == pytest.approx(4.5)
 
 
 def test_it_is_not_extended_to_what_the_front_has_passed() -> None:
     """The conflict with a body that begins behind the robot's front is dropped: its front is past it."""
-    near = with_swinging_ends(seen(0.0), np.array([SWING_M]), PlanarPose(2.5, 0.0, 0.0), FRONT_M)
+    near = with_swinging_ends(seen(0.0), np.array([SWING_M]), replace(VIEW, x_m=2.5), FRONT_M)
     assert float(near.xy_m[0, 0] - near.half_view_m[0]) == pytest.approx(2.5 + FRONT_M + 0.3)
-    beside = with_swinging_ends(seen(0.0), np.array([SWING_M]), PlanarPose(3.0, 0.0, 0.0), FRONT_M)
+    beside = with_swinging_ends(seen(0.0), np.array([SWING_M]), replace(VIEW, x_m=3.0), FRONT_M)
     assert float(beside.xy_m[0, 0] - beside.half_view_m[0]) == 3.5
 
 

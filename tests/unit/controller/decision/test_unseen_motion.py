@@ -11,11 +11,12 @@ import pytest
 from controller.decision.bodies import Bodies
 from controller.decision.unseen_motion import hardly_stood, velocities_agree, with_measured_velocity
 from controller.decision.unseen_position import extrapolated
+from controller.decision.view_edges import view_from
 from hal.types import CameraMount, PlanarPose
 from tests.support.floor_bodies import box
 
 MOUNT = CameraMount(0.45, 0.0, 0.60, 0.0)
-LOOKING_LEFT = PlanarPose(1.0, 2.0, math.pi / 2)
+LOOKING_LEFT = view_from(PlanarPose(1.0, 2.0, math.pi / 2), MOUNT, edge_tan=0.5, near_m=1.3, up_tan=math.inf)
 # Faster than this, a measurement is a mistake.
 MISTAKEN_MPS = 3.0
 
@@ -78,7 +79,7 @@ def test_a_mover_that_was_not_seen_to_cross_the_axis_stays_on_its_side() -> None
     unsure = box(1.05, 4.0, -0.09, 0.0, number=3)
     behind = box(1.3, 2.0, -1.0, 0.0, number=4)
     bodies = passes.joined(comes).joined(unsure).joined(behind)
-    xy_m = extrapolated(bodies, 0.5, LOOKING_LEFT, MOUNT)
+    xy_m = extrapolated(bodies, 0.5, LOOKING_LEFT)
     assert xy_m[0].tolist() == pytest.approx([1.0, 4.25])
     assert xy_m[1].tolist() == pytest.approx([1.1, 4.0])
     assert xy_m[2].tolist() == pytest.approx([1.005, 4.0])

@@ -17,7 +17,7 @@ from controller.campaign.noise_mission import drive_noise
 from controller.campaign.policies import build_policy
 from controller.campaign.stage import Stage
 from controller.campaign.task import judge_reference
-from controller.decision.view_edges import ViewEdges, beyond_edges, visible_from_m
+from controller.decision.view_edges import CurrentView, below_or_above_view, view_from, visible_from_m
 from controller.decision.world_model import WorldModel
 from controller.path.path import OnPath
 from hal.types import CameraMount, PlanarPose
@@ -34,6 +34,11 @@ LONG = Robot(
     limits=CONFIG.robot.limits,
     camera_mount=Mount(forward_m=1.0, height_m=1.1, pitch_deg=15.0),
 )
+
+
+def seen_from(height_m: float, near_m: float, up_tan: float) -> CurrentView:
+    """The view of a camera at this height over the robot's turning centre."""
+    return view_from(HERE, CameraMount(0.0, 0.0, height_m, 0.0), 0.5, near_m, up_tan)
 
 
 def driven(robot: Robot, family: str, seed: int) -> tuple[Row, DriveLog]:
@@ -62,14 +67,14 @@ def after_a_pallet(floor_from_m: float) -> WorldModel:
 @pytest.mark.parametrize(("floor_from_m", "near_m"), [(0.0, 1.3), (1.2, 1.3), (1.9, 1.9)])
 def test_body_that_sinks_below_the_view_is_kept(floor_from_m: float, near_m: float) -> None:
     known = after_a_pallet(floor_from_m)
-    assert known.edges.near_m == near_m
+    assert known.view.near_m == near_m
     assert known.remembered.tolist() == ([True] if floor_from_m > 1.6 else [])
 
 
 def test_where_the_view_begins_is_known_on_the_next_path_too() -> None:
     on = WorldModel(PATH, Robot(), MOUNT, DecisionConfig(), 0.0)
     on.take_over(after_a_pallet(1.9))
-    assert on.edges.near_m == 1.9
+    assert on.view.near_m == 1.9
 
 
 @pytest.mark.parametrize("seed", [6100000, 6100001, 6100003])
@@ -105,7 +110,7 @@ def test_body_that_rises_above_the_view_is_kept(
     up_tan: float, bottom_m: float, ahead_m: float, kept: bool
 ) -> None:
     known = after_a_beam(up_tan, bottom_m, ahead_m)
-    assert known.edges.up_tan == up_tan
+    assert known.view.up_tan == up_tan
     assert known.remembered.tolist() == ([True] if kept else [])
 
 
@@ -123,20 +128,20 @@ def test_a_camera_at_the_height_of_what_hangs_above_the_robot_sees_the_floor_und
 def test_robot_stops_far_enough_to_see_a_hanging_body(up_tan: float, off_m: float) -> None:
     """Its underside at 0.65 m has to be 0.1 m below the upper edge of a camera at 0.25 m; 3 m at most."""
     beam = box(8.0, 0.0, top_m=0.85, bottom_m=0.65)
-    found = visible_from_m(beam, np.zeros(1), 0.25, ViewEdges(0.5, 1.3, up_tan))[0]
+    found = visible_from_m(beam, np.zeros(1), seen_from(0.25, 1.3, up_tan))[0]
     assert min(found, 3.0) == pytest.approx(off_m, abs=0.01)
 
 
 def test_no_view_ends_where_the_robot_is() -> None:
     """A near_m of 0: what begins behind the camera is below its view, and nothing divides by zero."""
     pallets = box(0.0, 0.0, top_m=0.15).joined(box(1.0, 0.0, top_m=0.15))
-    found = beyond_edges(pallets, np.array([-0.01, 1.0]), 0.6, ViewEdges(0.5, 0.0, math.inf))
+    found = below_or_above_view(pallets, np.array([-0.01, 1.0]), seen_from(0.6, 0.0, math.inf))
     assert found.tolist() == [True, False]
 
 
 def test_where_a_body_can_be_seen_from() -> None:
     bodies = box(5.0, 0.6, top_m=1.7).joined(box(5.0, 0.0, top_m=0.15)).joined(box(5.0, 0.0, top_m=0.7))
     bodies = bodies.joined(box(5.0, 0.0, top_m=1.2, bottom_m=0.8))
-    seen_from = visible_from_m(bodies, np.array([0.6, 0.0, 0.0, 0.0]), 0.6, ViewEdges(0.5, 1.3, 0.3))
-    assert seen_from.tolist() == pytest.approx([1.2, 1.3 * (1 - 0.05 / 0.6), 0.0, (0.8 + 0.1 - 0.6) / 0.3])
-    assert visible_from_m(bodies, np.zeros(4), 0.6, ViewEdges(0.5, 1.3, math.inf))[3] == 0.0
+    found = visible_from_m(bodies, np.array([0.6, 0.0, 0.0, 0.0]), seen_from(0.6, 1.3, 0.3))
+    assert found.tolist() == pytest.approx([1.2, 1.3 * (1 - 0.05 / 0.6), 0.0, (0.8 + 0.1 - 0.6) / 0.3])
+    assert visible_from_m(bodies, np.zeros(4), seen_from(0.6, 1.3, math.inf))[3] == 0.0
