@@ -2,7 +2,7 @@
 
 Obstacles are found by edges, which a plain wall does not have, and no depth camera measures glass. So a
 surface that no obstacle explains counts as an obstacle, and floor that was not seen is not free.
-controller/decision/world_model.py calls Sight once a scene; controller/decision/speed_limits.py makes the
+controller/decision/world_model.py calls Sight once a scene; controller/decision/depth_limits.py makes the
 limits.
 """
 
