@@ -29,6 +29,7 @@ The files in the order of one control step:
 * camera_limits.py - how far the camera sees, and whether it works
 * speed_limits.py - asks the advisers: depth, standing bodies, moving bodies, worst case
 * depth_limits.py - a blind corner, a surface in the corridor, a covered lens, unseen floor
+* lateral_margin.py - which bodies beside the swept width count as in the way
 * standing_limits.py - bodies that stand in the corridor
 * outline.py - in bends, how far beside the corridor a body stands
 * watched.py - the bodies that move, pause or are young: where they will be, which enter the corridor

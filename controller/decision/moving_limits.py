@@ -19,6 +19,7 @@ from controller import braking
 from controller.decision.bodies import Bodies
 from controller.decision.crossing import Choice, Conflict, choices, find_conflicts
 from controller.decision.decision import Reason, Rule
+from controller.decision.lateral_margin import LateralMargin
 from controller.decision.limits import (
     ALONGSIDE_M,
     STANDING_MPS,
@@ -62,14 +63,16 @@ class MovingLimits:
     """Limits for moving bodies; keeps what hysteresis needs.
 
     times_s (K,): times from now at which bodies are placed.
-    inside: see controller/decision/standing_limits.py.
+    beside: which bodies are in the way; shared with StandingLimits.
     """
 
-    def __init__(self, config: DecisionConfig, limits: Limits, times_s: FloatArray, inside: set[int]) -> None:
+    def __init__(
+        self, config: DecisionConfig, limits: Limits, times_s: FloatArray, beside: LateralMargin
+    ) -> None:
         self._config, self._limits, self._times_s = config, limits, times_s
         self._comfort = braking.comfort(limits)
         self._speeds = np.linspace(0.0, limits.max_speed_mps, _SPEEDS)
-        self._inside = inside
+        self._beside = beside
         self._robot_passes_first: set[int] = set()
         self._leaves_s: dict[int, float] = {}
 
@@ -119,13 +122,12 @@ class MovingLimits:
 
         Notes whose they are, and forgets the choices and times of all others.
         """
-        margins, ids = self._config.margins, watched.bodies.ids
-        grazes = np.array([track_id in self._inside for track_id in ids.tolist()])
-        beside_m = margins.lateral_m + margins.graze_m * grazes
+        ids = watched.bodies.ids
+        needed_m = self._beside.all_needed_m(ids)
         sigma_mps = watched.velocities.sigma_left_mps * self._config.prediction.sigmas
         found = [
             one
-            for one in find_conflicts(watched.placed, self._times_s, sigma_mps, beside_m, rows)
+            for one in find_conflicts(watched.placed, self._times_s, sigma_mps, needed_m, rows)
             if one.hi_in_m > s_m and one.lo_in_m > from_s_m
         ]
         track_ids = {int(ids[one.row]) for one in found}
@@ -139,12 +141,10 @@ class MovingLimits:
 
     def _note_inside(self, watched: Watched, in_the_way: set[int]) -> None:
         """The bodies with these ids count as in the corridor; of the others, those that moved away do not."""
-        if self._inside:
-            bodies = watched.bodies
-            away_m = self._config.margins.lateral_m + self._config.margins.graze_m
-            away = bodies.moving & (watched.placed.clearance_m[:, 0] > away_m)
-            self._inside.difference_update(bodies.ids[away].tolist())
-        self._inside |= in_the_way
+        bodies = watched.bodies
+        away = bodies.moving & (watched.placed.clearance_m[:, 0] > self._beside.farthest_m)
+        self._beside.goes_out(bodies.ids[away].tolist())
+        self._beside.comes_in(in_the_way)
 
     def _steadied(self, conflict: Conflict, track_id: int, now_s: float) -> Conflict:
         """The conflict with its time of leaving averaged: each estimate extrapolates a noisy speed."""

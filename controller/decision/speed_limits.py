@@ -19,6 +19,7 @@ from config.decision import DecisionConfig
 from config.robot import Limits
 from controller.decision.bodies import Bodies
 from controller.decision.depth_limits import DepthLimits
+from controller.decision.lateral_margin import LateralMargin
 from controller.decision.limits import Limit, Motion
 from controller.decision.moving_limits import MovingLimits
 from controller.decision.standing_limits import StandingLimits
@@ -38,9 +39,9 @@ class SpeedLimits:
         coarse = np.arange(fine[-1] + _COARSE_S, config.prediction.horizon_s + _COARSE_S, _COARSE_S)
         times_s = np.concatenate((fine, coarse))
         self._depth = DepthLimits(config, limits)
-        self._inside: set[int] = set()
-        self._standing = StandingLimits(config, limits, self._inside)
-        self._moving = MovingLimits(config, limits, times_s, self._inside)
+        self._beside = LateralMargin(config.margins)
+        self._standing = StandingLimits(config, limits, self._beside)
+        self._moving = MovingLimits(config, limits, times_s, self._beside)
         self._watch = Watch(config, times_s)
         self._taken_from: Bodies | None = None
 
@@ -72,5 +73,4 @@ class SpeedLimits:
         """Once a scene: select the watched bodies, and forget those that are gone."""
         self._taken_from = known.bodies
         self._watch.take_in(known)
-        if self._inside:
-            self._inside.intersection_update(known.bodies.ids.tolist())
+        self._beside.keep_only(known.bodies.ids)

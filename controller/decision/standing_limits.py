@@ -16,6 +16,7 @@ from config.robot import Limits
 from controller import braking
 from controller.decision.bodies import Bodies
 from controller.decision.corridor import BEYOND_RANGE_M, Corridor, Placed, place
+from controller.decision.lateral_margin import LateralMargin
 from controller.decision.limits import (
     ALONGSIDE_M,
     STANDING_MPS,
@@ -34,9 +35,7 @@ from hal.types import FloatArray
 
 # Beside the robot (its front is past the near side) only a body this far inside the corridor counts.
 _INSIDE_BODY_M = 0.05
-# Hysteresis is against measurements that change, so it ends: what has been clear of the lateral margin for so
-# long stays clear. While the robot drives, what has not been seen for _UNMEASURED_S does not count as clear.
-_CLEAR_FOR_S = 2.0
+# While the robot drives, what has not been seen for so long does not count as clear of the lateral margin.
 _UNMEASURED_S = 0.3
 # Outlines are kept of bodies this far beside the lateral margin: later, when only a part is in view, the box
 # of such a body may reach into the corridor.
@@ -68,60 +67,45 @@ class _Near:
 class StandingLimits:
     """Limits for standing bodies.
 
-    inside: ids of bodies that count as in the corridor (hysteresis); shared with MovingLimits, because bodies
-    start and stop. Standing bodies are placed once a scene, not once a step.
+    beside: which bodies beside the corridor are in the way; shared with MovingLimits. Standing bodies are
+    placed once a scene, not once a step.
     """
 
-    def __init__(self, config: DecisionConfig, limits: Limits, inside: set[int]) -> None:
+    def __init__(self, config: DecisionConfig, limits: Limits, beside: LateralMargin) -> None:
         self._config, self._limits = config, limits
         self._comfort, self._emergency = braking.comfort(limits), braking.emergency(limits)
-        self._inside = inside
+        self._beside = beside
         self._taken_from: Bodies | None = None
         self._near: list[_Near] = []
         self._corridor: Corridor | None = None
         self._outlines_m: dict[int, float] = {}
-        self._clear_since_s: dict[int, float] = {}
 
     def limits(self, known: WorldModel, s_m: float, motion: Motion, now_s: float) -> list[Limit]:
         """The limits for a robot at s_m."""
         if known.bodies is not self._taken_from or known.corridor is not self._corridor:
             self._take_in(known, s_m)
-        margins = self._config.margins
+        margins, beside = self._config.margins, self._beside
         found = []
         for near in self._near:
             if near.block_to_s_m <= s_m:
                 continue
             track_id, gap_m = near.track_id, near.block_from_s_m - s_m
-            self._note_clear(near, motion.v_mps, now_s)
-            if self._has_long_been_clear(track_id, now_s):
-                self._inside.discard(track_id)
-            beside_m = margins.lateral_m + (margins.graze_m if track_id in self._inside else 0.0)
-            if gap_m < -ALONGSIDE_M:
-                # The front has passed its near side: only a body that the robot would really touch counts.
-                beside_m = -_INSIDE_BODY_M
-            if near.clearance_m > beside_m:
-                self._inside.discard(track_id)
+            measured = motion.v_mps <= STANDING_MPS or near.unseen_s <= _UNMEASURED_S
+            beside.note_clearance(track_id, near.clearance_m, measured, now_s)
+            # Once the front has passed its near side, only a body that the robot would really touch counts.
+            needed_m = -_INSIDE_BODY_M if gap_m < -ALONGSIDE_M else beside.needed_m(track_id)
+            if near.clearance_m > needed_m:
+                beside.goes_out((track_id,))
                 continue
             gap = Gap(gap_m, obstacle_id=track_id, unseen_s=near.unseen_s)
             if self._may_wait(gap, motion, near.age_s):
                 continue
-            self._inside.add(track_id)
-            what = standing_text(near.clearance_m, margins.lateral_m + margins.graze_m)
+            beside.comes_in((track_id,))
+            what = standing_text(near.clearance_m, beside.farthest_m)
             found.append(
                 stop_before(gap, motion, self._comfort, near.stop_m, margins.least_m, "static", what)
             )
         return found
-
-    def _note_clear(self, near: _Near, v_mps: float, now_s: float) -> None:
-        """Note since when a body has been clear of the lateral margin."""
-        known = v_mps <= STANDING_MPS or near.unseen_s <= _UNMEASURED_S
-        if known and near.clearance_m > self._config.margins.lateral_m:
-            self._clear_since_s.setdefault(near.track_id, now_s)
-        else:
-            self._clear_since_s.pop(near.track_id, None)
-
-    def _has_long_been_clear(self, track_id: int, now_s: float) -> bool:
-        return now_s - self._clear_since_s.get(track_id, math.inf) >= _CLEAR_FOR_S
 
     def _take_in(self, known: WorldModel, s_m: float) -> None:
         """Place the standing bodies of a new scene, or along a new path, and drop those too far aside.
@@ -134,20 +118,17 @@ class StandingLimits:
         bodies = known.bodies
         if np.count_nonzero(bodies.moving) == len(bodies):
             return
-        sight, margins = self._config.sight, self._config.margins
-        placed = place(bodies, known.corridor, _NOW, s_m, sight.range_m + BEYOND_RANGE_M)
+        placed = place(bodies, known.corridor, _NOW, s_m, self._config.sight.range_m + BEYOND_RANGE_M)
         clearance_m = self._clearances(known, placed, s_m, before)
-        near = _stands_within(bodies.moving, clearance_m, -math.inf, margins.lateral_m + margins.graze_m)
-        if self._inside:
-            self._inside.difference_update(bodies.ids[~(near | bodies.moving)].tolist())
+        near = _stands_within(bodies.moving, clearance_m, -math.inf, self._beside.farthest_m)
+        self._beside.goes_out(bodies.ids[~(near | bodies.moving)].tolist())
         rows = near.nonzero()[0]
         if len(rows):
             stop_m = self._stands_off_m(known, bodies, placed)
             fields = _columns(rows, bodies, placed, clearance_m, stop_m).tolist()
             track_ids = bodies.ids[rows].tolist()
             self._near = [_Near(one, *others) for one, others in zip(track_ids, fields, strict=True)]
-        for gone in self._clear_since_s.keys() - {near.track_id for near in self._near}:
-            del self._clear_since_s[gone]
+        self._beside.keep_times_of(near.track_id for near in self._near)
 
     def _clearances(
         self, known: WorldModel, placed: Placed, s_m: float, before: dict[int, float]

@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from config.decision import DecisionConfig
+from config.decision import DecisionConfig, Margins
 from config.robot import Body, Robot
 from controller.decision.corridor import Corridor
 from controller.decision.decision import Decision
+from controller.decision.lateral_margin import LateralMargin
 from controller.decision.limits import Motion
 from controller.decision.outline import Outline, outline_of
 from controller.decision.situation import Situation
@@ -222,7 +223,7 @@ def test_on_another_path_what_stands_is_placed_anew_without_a_new_scene() -> Non
     assert known.surfaces is before.surfaces
     assert known.health is before.health
     assert known.view == before.view
-    standing = StandingLimits(DecisionConfig(), Robot().limits, set())
+    standing = StandingLimits(DecisionConfig(), Robot().limits, LateralMargin(Margins()))
     motion = Motion(0.4, 0.0, 0.2)
     assert standing.limits(before, 0.0, motion, 0.0) == []
     (limit,) = standing.limits(known, 0.0, motion, 0.0)
