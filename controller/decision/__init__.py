@@ -21,7 +21,8 @@ The files in the order of one control step:
 * lately_moved.py - which bodies only pause: they moved a moment ago
 * lens_cover.py - whether something covers the lens
 * corridor.py - the swept width along the path, and bodies in path coordinates
-* sight.py - how far the corridor was seen free, and unexplained surfaces in it
+* sight.py - what depth sees of the corridor, and unexplained surfaces in it
+* known_floor.py - how far the corridor was seen free
 * held_surface.py - the nearest of these surfaces, also after it has left the view
 * blind_corners.py - where somebody may step out
 * limits.py - a speed limit with its reason

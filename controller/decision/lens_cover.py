@@ -1,8 +1,8 @@
 """Whether something stands so near to the lens that depth fails; noticed by bands without data.
 
-Floor that was seen free stays free once it is too near to be seen again (controller/decision/sight.py), even
-if somebody has stepped onto it since. Within 0.3 m of the lens hardly any camera measures depth, so whoever
-is there leaves bands of the view without any data, from the lowest row to the uppermost one.
+Floor that was seen free stays free once it is too near to be seen again (controller/decision/known_floor.py),
+even if somebody has stepped onto it since. Within 0.3 m of the lens hardly any camera measures depth, so
+whoever is there leaves bands of the view without any data, from the lowest row to the uppermost one.
 controller/decision/world_model.py calls LensCover once a scene.
 """
 

@@ -33,8 +33,6 @@ MIN_TAN, _MIN_M = 0.1, 1e-3  # lower bounds of divisors
 EDGE_TOLERANCE_M, EDGE_TOLERANCE_MPS = 0.3, 0.15
 # A body farther behind the camera than about a robot's length no longer counts as out of view.
 _BEHIND_M = 2.0
-# Floor below the view beyond this distance is too much to be taken as free without having been seen.
-MAX_ASSUMED_FREE_M = 2.5
 
 
 @record(frozen=True, slots=True)
@@ -75,15 +73,6 @@ def view_from(
         near_m,
         up_tan,
     )
-
-
-def assumed_free_m(near_m: float, floor_from_m: float) -> float:
-    """How far ahead of the camera the floor is taken as free although it was never seen, in metres.
-
-    Whoever starts the robot consents to that: up to near_m, or to floor_from_m, where the floor comes into
-    view, but never more than MAX_ASSUMED_FREE_M (unless near_m is more).
-    """
-    return max(near_m, min(floor_from_m, MAX_ASSUMED_FREE_M))
 
 
 def may_be_above_view_within_m(top_m: float, height_m: float, up_tan: float) -> float:

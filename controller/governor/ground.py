@@ -1,9 +1,9 @@
 """Remembers the floor around the robot as the camera saw it on the way here, outside the present view.
 
 On a path known beforehand, the camera sees the floor long before the robot is there
-(controller/decision/sight.py). A planner's arc begins below the camera's view, turns into floor beside the
-view, or sweeps all around the robot. That floor was seen earlier, from elsewhere. It is kept in a square grid
-around the robot. ground_limits.py makes limits from it.
+(controller/decision/known_floor.py). A planner's arc begins below the camera's view, turns into floor beside
+the view, or sweeps all around the robot. That floor was seen earlier, from elsewhere. It is kept in a square
+grid around the robot. ground_limits.py makes limits from it.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from config.decision import DecisionConfig
 from config.robot import Robot
 from controller.decision.bodies import Bodies
+from controller.decision.known_floor import assumed_free_m
 from controller.decision.surfaces import bands_at, floor_points, surfaces_of
-from controller.decision.view_edges import assumed_free_m
 from hal.clocks import NS_PER_MS, NS_PER_S
 from hal.types import CameraMount, FloatArray, PlanarPose
 from vision.scene import FreeSpace

@@ -1,6 +1,6 @@
 """A mounting from which the floor right before the robot is not seen: a warning before the drive.
 
-Whoever starts the robot consents to a little floor that was never seen (view_edges.MAX_ASSUMED_FREE_M). If
+Whoever starts the robot consents to a little floor that was never seen (known_floor.MAX_ASSUMED_FREE_M). If
 the image begins beyond that, the robot drives so far and then waits for floor that it cannot see.
 """
 
@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from config.app import AppConfig
-from controller.decision.view_edges import MAX_ASSUMED_FREE_M
+from controller.decision.known_floor import MAX_ASSUMED_FREE_M
 
 
 def floor_view_warning(config: AppConfig) -> str | None:
