@@ -1,12 +1,10 @@
-"""What the decision knows of the way ahead: the last good scene, and the bodies out of view since then.
+"""What the decision knows of the way ahead: the last good scene, and what is remembered of those before.
 
-For each new scene, WorldModel turns the obstacles into boxes (controller/decision/obstacle_boxes.py),
-tells newcomers from tracks that were merely renumbered (controller/decision/known_places.py), averages their
-velocities (controller/decision/velocity_filter.py), extends those that may be nearer than they are seen
-(controller/decision/cut_movers.py, turning_vehicles.py), adds bodies that have left the view
-(controller/decision/out_of_view.py), and notes free floor and unexplained surfaces along the path
-(controller/decision/sight.py). In each control step it says whether the camera can be relied on (the field
-fault). controller/decision/speed_limits.py turns what is known into speed limits.
+WorldModel takes in each new scene: the obstacles as boxes (controller/decision/obstacle_boxes.py) and what is
+known of these bodies (known_bodies.py), the surfaces that depth sees (surfaces.py), whether the lens is
+covered (lens_cover.py), and free floor and unexplained surfaces along the path (sight.py). In each control
+step it says whether the camera can be relied on (the field fault). controller/decision/speed_limits.py turns
+what is known into speed limits.
 """
 
 from __future__ import annotations
@@ -14,39 +12,27 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from config.decision import DecisionConfig
 from config.perception import TYPICAL_DEPTH_NOISE, DepthNoise
 from config.robot import Robot
 from controller.base.localise import PoseHistory
-from controller.decision.bodies import Bodies, no_bodies
+from controller.decision.bodies import Bodies
 from controller.decision.corridor import Corridor
-from controller.decision.cut_movers import with_hidden_near_sides
-from controller.decision.known_places import KnownPlaces
-from controller.decision.lately_moved import LatelyMoved
+from controller.decision.known_bodies import KnownBodies
 from controller.decision.lens_cover import LensCover
 from controller.decision.limits import STANDING_MPS
 from controller.decision.obstacle_boxes import bodies_of
-from controller.decision.out_of_view import OutOfView
 from controller.decision.sight import Sight
 from controller.decision.situation import SceneError
 from controller.decision.surfaces import NO_SURFACES, check_scan, surfaces_of
-from controller.decision.turning_vehicles import TurningVehicles, with_swinging_ends
-from controller.decision.velocity_filter import SteadyVelocities
 from controller.decision.view_edges import CurrentView, view_from
 from controller.path.path import OnPath, Path
 from hal.clocks import NS_PER_S
 from hal.compiled import compiled
-from hal.types import CameraMount, FloatArray, PlanarPose
+from hal.types import CameraMount, Flags, FloatArray, PlanarPose
 from vision.scene import CameraCondition, CameraHealth, FreeSpace, Scene
 
-# Half size above which a standing body is no box. The box of a wall or a rack would reach into the corridor
-# wherever the path bends; what of its surface is in the corridor, depth sees (controller/decision/sight.py).
-_MAX_BOX_HALF_M = 0.8
-# Half width up to which a standing body is no box but a strip: along a rack there are dozens of strips a
-# centimetre or two wide, different ones in each frame. Poles are wider.
-_MIN_BOX_HALF_WIDTH_M = 0.015
 _FUTURE_S = 0.005  # tolerance of the scene's time stamp
 # Until a scene tells where the view ends to the sides; that of an ordinary camera.
 _EDGE_TAN = 0.5
@@ -57,10 +43,6 @@ _GOOD = CameraHealth(CameraCondition.GOOD, "", float("nan"))
 class WorldModel:
     """Takes in scenes along one path. Points are in metres, in the frame of the path.
 
-    bodies: N boxes that count, those in view before those out of view (controller/decision/bodies.py).
-    remembered: (N,) which of them are out of view.
-    pausing: (N,) which stand, but moved a moment ago.
-    unboxed: M more bodies in view that count as surfaces only.
     surfaces: P points that depth saw, and how far it saw in each band (controller/decision/surfaces.py).
     corridor: the floor that the robot sweeps along the path.
     sight: how much of the corridor was seen free, and the nearest unexplained surface in it.
@@ -84,24 +66,14 @@ class WorldModel:
         self.corridor = Corridor(path, robot.body)
         self.sight = Sight(self.corridor, mount, config, start_s_m)
         self.lens = LensCover()
-        self.bodies = self._seen = no_bodies(0)
         self.surfaces = NO_SURFACES
         self.health = _GOOD
         self.fault = "no scene yet"
         self.age_s = self.since_s = float("inf")
         self._mount, self._config, self._noise = mount, config, noise
         self._poses = PoseHistory()
-        # Which of the K seen bodies became boxes (K,), and these boxes with averaged velocities.
-        self._boxed = np.zeros(0, np.bool_)
-        self._unboxed: Bodies | None = None
-        self._boxes = no_bodies(0)
-        self._velocity_filter = SteadyVelocities()
-        self._out_of_view = OutOfView(robot.limits.max_obstacle_speed_mps)
+        self._around = KnownBodies(config, robot)
         self.view = view_from(_UNKNOWN_POSE, mount, _EDGE_TAN, config.sight.near_m, math.inf)
-        self._known_places = KnownPlaces()
-        self._lately_moved = LatelyMoved()
-        self.pausing: NDArray[np.bool_] = np.zeros(0, np.bool_)
-        self._turning = TurningVehicles(config.margins.stop_m - config.margins.least_m)
         self._captured_ns: int | None = None
         self._scene_fault = ""
 
@@ -115,27 +87,31 @@ class WorldModel:
         return self._captured_ns is not None and scene.captured_ns <= self._captured_ns
 
     def take_over(self, before: WorldModel) -> None:
-        """Take over what does not depend on the path: bodies, velocities, surfaces, the camera's state."""
-        self.bodies, self._boxes = before.bodies, before._boxes
-        self._seen, self._boxed, self._unboxed = before._seen, before._boxed, before._unboxed
-        self._velocity_filter, self._out_of_view = before._velocity_filter, before._out_of_view
-        self._known_places, self._turning = before._known_places, before._turning
-        self._lately_moved, self.pausing = before._lately_moved, before.pausing
-        self._poses, self.surfaces, self.lens = before._poses, before.surfaces, before.lens
+        """Take over what does not depend on the path: bodies, surfaces, the camera's state."""
+        self._around, self.surfaces = before._around, before.surfaces
+        self._poses, self.lens = before._poses, before.lens
         self.health, self.view = before.health, before.view
         self._captured_ns, self._scene_fault = before._captured_ns, before._scene_fault
 
     @property
-    def remembered(self) -> NDArray[np.bool_]:
+    def bodies(self) -> Bodies:
+        """N boxes that count, those in view before those out of view (controller/decision/bodies.py)."""
+        return self._around.bodies
+
+    @property
+    def remembered(self) -> Flags:
         """(N,) which of the bodies are out of view."""
-        return np.arange(len(self.bodies)) >= len(self._boxes)
+        return self._around.remembered
+
+    @property
+    def pausing(self) -> Flags:
+        """(N,) which of the bodies stand, but moved a moment ago."""
+        return self._around.pausing
 
     @property
     def unboxed(self) -> Bodies:
-        """The bodies in view that count as surfaces only."""
-        if self._unboxed is None:
-            self._unboxed = self._seen.select(~self._boxed)
-        return self._unboxed
+        """M more bodies in view that count as surfaces only."""
+        return self._around.unboxed
 
     def update(
         self, scene: Scene | None, pose: PlanarPose, on_path: OnPath, v_mps: float, now_ns: int
@@ -186,24 +162,12 @@ class WorldModel:
         except SceneError as error:
             return str(error)
         free, s_m = scene.free_space, self.corridor.path.project(pose, on_path.s_m).s_m
-        self.view = view = self._view_of(free, pose)
-        swing_m = self._turning.swing_m(seen, view)
-        boxed = _boxed(seen.half_view_m, seen.half_across_m, seen.moving) | (swing_m > 0.0)
-        self.surfaces = surfaces = surfaces_of(free, pose, self._mount, self._noise)
-        boxes = self._known_places.without_newcomers(seen.select(boxed), seen.ids)
-        boxes = self._velocity_filter.update(boxes)
-        boxes = self._out_of_view.mark_leaving_movers(boxes, view)
         standing = v_mps <= STANDING_MPS
-        remembered = self._out_of_view.update(self._boxes, boxes, view, standing, free)
-        extended = with_hidden_near_sides(boxes, view, self.corridor.front_m)
-        extended = with_swinging_ends(extended, swing_m[boxed], view, self.corridor.front_m)
-        self.bodies = extended.joined(remembered)
-        self._boxes, self._seen, self._boxed, self._unboxed = boxes, seen, boxed, None
-        self._lately_moved.look(boxes)
-        self.pausing = self._lately_moved.pausing(self.bodies)
+        self.view = view = self._view_of(free, pose)
+        self.surfaces = surfaces = surfaces_of(free, pose, self._mount, self._noise)
+        self._around.look(seen, view, free, surfaces, standing)
         self.lens.look(free, self.corridor.half_width_at(s_m), self._mount.left_m)
-        self.sight.look(free, surfaces, pose, s_m, scene.captured_ns, boxes, standing)
-        self._known_places.remember(scene.captured_ns, surfaces.points_m, seen)
+        self.sight.look(free, surfaces, pose, s_m, scene.captured_ns, self._around.in_view, standing)
         self.health = scene.health
         self._captured_ns = scene.captured_ns
         return ""
@@ -215,18 +179,6 @@ class WorldModel:
             edge_tan = _outermost(free.bearing_tan) + free.half_width_tan
         near_m = max(self._config.sight.near_m, free.floor_from_m)
         return view_from(pose, self._mount, edge_tan, near_m, free.up_tan)
-
-
-@compiled("float64[:], float64[:], boolean[:]")
-def _boxed(
-    half_view_m: FloatArray, half_across_m: FloatArray, moving: NDArray[np.bool_]
-) -> NDArray[np.bool_]:
-    """(N,) which bodies count as boxes: movers, and standing ones that are neither large nor mere strips."""
-    boxed = np.empty(len(moving), np.bool_)
-    for k in range(len(moving)):
-        sprawls = max(half_view_m[k], half_across_m[k]) > _MAX_BOX_HALF_M
-        boxed[k] = moving[k] or (half_across_m[k] > _MIN_BOX_HALF_WIDTH_M and not sprawls)
-    return boxed
 
 
 @compiled("float64[:]")
