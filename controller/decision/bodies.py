@@ -14,6 +14,9 @@ from hal.directions import along_and_left
 from hal.records import record
 from hal.types import Flags, FloatArray, Integers, Matrices, Matrix, Vector
 
+# Minimum time for which a body must have been seen before it is remembered out of view or its velocity used.
+MIN_TRACKED_S = 0.5
+
 
 @record(frozen=True, slots=True, eq=False)
 class Bodies:

@@ -14,8 +14,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.decision.bodies import Bodies, covering
-from controller.decision.unseen_motion import MIN_TRACKED_S
+from controller.decision.bodies import MIN_TRACKED_S, Bodies, covering
 from hal.clocks import NS_PER_S
 from hal.compiled import compiled
 from hal.types import FloatArray

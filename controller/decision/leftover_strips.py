@@ -14,10 +14,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.decision.bodies import Bodies
+from controller.decision.bodies import MIN_TRACKED_S, Bodies
 from controller.decision.unseen_motion import (
     MIN_MOVER_HALF_WIDTH_M,
-    MIN_TRACKED_S,
     hardly_stood,
     velocities_agree,
 )
@@ -49,8 +48,8 @@ def leftover_strips(bodies: Bodies, kept: NDArray[np.bool_]) -> NDArray[np.bool_
     return np.asarray(strips & (beside & alike).any(axis=1))
 
 
-def first_strips(bodies: Bodies, since_s: FloatArray, seen: Bodies) -> NDArray[np.bool_]:
-    """(N,) which of the bodies, last seen since_s ago (N,), were the first visible parts of seen movers.
+def first_strips(bodies: Bodies, missing_s: FloatArray, seen: Bodies) -> NDArray[np.bool_]:
+    """(N,) which of the bodies, missing for missing_s (N,), were the first visible parts of seen movers.
 
     They moved, were seen for MIN_TRACKED_S at most, and a mover has come into view near their place since. It
     has been seen for longer, so that its velocity is known.
@@ -61,6 +60,6 @@ def first_strips(bodies: Bodies, since_s: FloatArray, seen: Bodies) -> NDArray[n
     if not (np.count_nonzero(strips) and np.count_nonzero(known)):
         return np.zeros(len(bodies), np.bool_)
     movers = seen.select(known)
-    came_since = movers.tracked_s <= since_s[:, None] + _OVERLAP_S
+    came_since = movers.tracked_s <= missing_s[:, None] + _OVERLAP_S
     near = movers.covers(bodies.xy_m, bodies.half_view_m + _REACH_M, _REACH_M)
     return np.asarray(strips & (came_since & near).any(axis=1))

@@ -36,11 +36,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import IMPLAUSIBLE_SPEED_FACTOR
-from controller.decision.bodies import Bodies, covering, no_bodies
+from controller.decision.bodies import MIN_TRACKED_S, Bodies, covering, no_bodies
 from controller.decision.leftover_strips import first_strips, leftover_strips
 from controller.decision.seen_through import SeenThrough, unproven
 from controller.decision.unseen_motion import (
-    MIN_TRACKED_S,
     agrees,
     as_tall_as_a_person,
     may_enter_way,
@@ -78,7 +77,7 @@ class OutOfView:
         self._mistaken_mps = IMPLAUSIBLE_SPEED_FACTOR * max_obstacle_speed_mps
         self._seen_through = SeenThrough()
         self._bodies = no_bodies(0)
-        self._since_s: FloatArray = np.zeros(0)
+        self._missing_s: FloatArray = np.zeros(0)  # for how long each has been missing
         self._stands_since_ns: int | None = None
         # Of bodies that are judged standing but clearly approached: by id, when last, and how fast.
         self._approached: dict[int, tuple[int, FloatArray]] = {}
@@ -96,13 +95,13 @@ class OutOfView:
         # The edge of the view cuts bodies off, so the present width says little.
         self._widest_half_m = _widest(seen.ids, seen.half_across_m, self._widest_of, self._widest_half_m)
         self._widest_of = seen.ids
-        out, comes = unseen_or_approaching(seen, self._widest_half_m, view)
-        if not self._approached and not np.count_nonzero(comes):
+        unseen, approaches = unseen_or_approaching(seen, self._widest_half_m, view)
+        if not self._approached and not np.count_nonzero(approaches):
             return seen
-        self._approached = self._lately_approached(seen, out, comes)
+        self._approached = self._lately_approached(seen, unseen, approaches)
         ids = seen.ids.tolist()
-        came = np.array([one in self._approached for one in ids], np.bool_)
-        leaves = out & came & out_of_view(seen, view)
+        approached = np.array([one in self._approached for one in ids], np.bool_)
+        leaves = unseen & approached & out_of_view(seen, view)
         if not np.count_nonzero(leaves):
             return seen
         velocity = seen.velocity_mps.copy()
@@ -123,7 +122,7 @@ class OutOfView:
         dt_s = (seen.captured_ns - before.captured_ns) / NS_PER_S
         if not standing or self._stands_since_ns is None:
             self._stands_since_ns = seen.captured_ns if standing else None
-        bodies, since_s = self._with_missing(before, seen, dt_s, view)
+        bodies, missing_s = self._with_missing(before, seen, dt_s, view)
         if not len(bodies):
             self._seen_through.forget()
             return no_bodies(seen.captured_ns)
@@ -132,45 +131,51 @@ class OutOfView:
         bodies = bodies.moved_to(seen.captured_ns, xy_m, bodies.unseen_s + dt_s)
         out = out_of_view(bodies, view)
         out |= unproven(bodies, view, free)
-        kept = self._still_there(bodies, since_s, seen, out, view)
+        kept = _kept(bodies, missing_s, seen, out, view)
+        if some_move:
+            kept &= ~first_strips(bodies, missing_s, seen)
+            kept &= ~leftover_strips(bodies, kept)
         if standing:
             kept &= ~self._seen_through.seen_empty(bodies, view, free)
         else:
             self._seen_through.forget()
         if np.count_nonzero(kept) < len(kept):
-            since_s, bodies = since_s[kept], bodies.select(kept)
-        self._since_s = since_s
+            missing_s, bodies = missing_s[kept], bodies.select(kept)
+        self._missing_s = missing_s
         if some_move:
-            bodies = pushed_out_of_view(bodies, since_s, view, free)
+            bodies = pushed_out_of_view(bodies, missing_s, view, free)
         self._bodies = bodies
         return bodies
 
     def _lately_approached(
-        self, seen: Bodies, out: BoolArray, comes: BoolArray
+        self, seen: Bodies, unseen: BoolArray, approaches: BoolArray
     ) -> dict[int, tuple[int, FloatArray]]:
-        """Which bodies judged standing have lately approached; out, comes: of unseen_or_approaching."""
+        """Which bodies that are judged standing have lately approached: when last, and how fast.
+
+        unseen, approaches (N,): see unseen_or_approaching().
+        """
         now_ns, lately = seen.captured_ns, {}
         stands_tall = ~seen.moving & as_tall_as_a_person(seen)
         for k, track_id in enumerate(seen.ids.tolist()):
             before = self._approached.get(track_id)
-            if comes[k]:
+            if approaches[k]:
                 lately[track_id] = now_ns, seen.measured_mps[k]
-            elif before is not None and (out[k] or (stands_tall[k] and now_ns - before[0] <= _LATELY_NS)):
+            elif before is not None and (unseen[k] or (stands_tall[k] and now_ns - before[0] <= _LATELY_NS)):
                 lately[track_id] = before
         return lately
 
     def _with_missing(
         self, before: Bodies, seen: Bodies, dt_s: float, view: CurrentView
     ) -> tuple[Bodies, FloatArray]:
-        """The bodies kept so far, then those of before that are missing in seen; and since when, in seconds.
+        """The bodies kept so far, then those of before that are missing in seen; and for how long (N,).
 
         The latter move, or have stood long enough to be believed and were last seen while the robot drove, or
         stopped before they sank below the view.
         """
-        bodies, since_s = self._bodies, self._since_s + dt_s
+        bodies, missing_s = self._bodies, self._missing_s + dt_s
         missing = _missing(before.ids, seen.ids)
         if not np.count_nonzero(missing):
-            return bodies, since_s
+            return bodies, missing_s
         gone = with_measured_velocity(before.select(missing), self._mistaken_mps)
         stopped = stopped_below_view(gone, view)
         stood = stopped | (~gone.moving & self._last_seen_driving(gone))
@@ -179,7 +184,7 @@ class OutOfView:
             gone = replace(gone, velocity_mps=velocity, moving=gone.moving & ~stopped)
         gone = gone.select(gone.moving | (stood & (gone.age_s >= MIN_TRACKED_S)))
         gone = gone.select(~_parts_of_movers(gone, seen))
-        return bodies.joined(gone), np.concatenate((since_s, np.full(len(gone), dt_s)))
+        return bodies.joined(gone), np.concatenate((missing_s, np.full(len(gone), dt_s)))
 
     def _last_seen_driving(self, bodies: Bodies) -> BoolArray:
         """(N,) which bodies were last seen before the robot came to rest, if it stands now.
@@ -190,19 +195,6 @@ class OutOfView:
         if self._stands_since_ns is None:
             return np.ones(len(bodies), np.bool_)
         return np.asarray(bodies.captured_ns - bodies.unseen_s * NS_PER_S <= self._stands_since_ns)
-
-    def _still_there(
-        self, bodies: Bodies, since_s: FloatArray, seen: Bodies, out: BoolArray, view: CurrentView
-    ) -> BoolArray:
-        """(N,) which bodies, last seen since_s ago (N,), are out of view (N,) and not part of a seen one.
-
-        Movers are kept for a limited time only.
-        """
-        kept = _still_kept(bodies, since_s, seen, out, view)
-        if not np.count_nonzero(bodies.moving):
-            return kept
-        kept &= ~first_strips(bodies, since_s, seen)
-        return kept & ~leftover_strips(bodies, kept)
 
 
 @compiled("int64[:], int64[:]")
@@ -231,15 +223,19 @@ def _parts_of_movers(gone: Bodies, seen: Bodies) -> BoolArray:
 
 
 @compiled(Bodies, "float64[:]", Bodies, "boolean[:]", CurrentView)
-def _still_kept(
-    bodies: Bodies, since_s: FloatArray, seen: Bodies, out: BoolArray, view: CurrentView
+def _kept(
+    bodies: Bodies, missing_s: FloatArray, seen: Bodies, out: BoolArray, view: CurrentView
 ) -> BoolArray:
-    """(N,) as OutOfView._still_there(), leftover strips included."""
+    """(N,) which bodies, missing for missing_s (N,), are out of view (N,) and not part of a seen one.
+
+    Movers are kept for a limited time only.
+    """
     covered = covering(seen, bodies.xy_m, bodies.half_view_m, _SAME_PLACE_M)
     kept = out.copy()
     for k in range(len(kept)):
         moving = bodies.moving[k]
-        if moving and since_s[k] > (_MAY_ENTER_KEPT_S if may_enter_way(bodies, k, view) else _MOVING_KEPT_S):
+        kept_s = _MAY_ENTER_KEPT_S if may_enter_way(bodies, k, view) else _MOVING_KEPT_S
+        if moving and missing_s[k] > kept_s:
             kept[k] = False
         for m in range(len(seen.ids)):
             part_of = covered[k, m] and (not moving or agrees(bodies, k, seen, m))

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.decision.bodies import Bodies
+from controller.decision.bodies import MIN_TRACKED_S, Bodies
 from controller.decision.view_edges import CurrentView, ahead_and_left, is_below_view
 from hal.compiled import compiled, inlined
 from hal.directions import along_and_left
@@ -19,8 +19,6 @@ from hal.types import FloatArray
 
 BoolArray = NDArray[np.bool_]
 
-# Minimum time for which a body must have been seen before it is remembered out of view or its velocity used.
-MIN_TRACKED_S = 0.5
 # A body that is judged standing counts as approaching if it is faster than both thresholds. Noise makes
 # standing things beside the view seem to creep now and then; lower thresholds would slow the robot each time.
 _APPROACH_MIN_SIGMAS, _APPROACH_MIN_MPS = 3.3, 0.2
@@ -75,14 +73,14 @@ def unseen_or_approaching(
     greatest width that each was seen with.
     """
     cos, sin = math.cos(view.heading_rad), math.sin(view.heading_rad)
-    out, comes = np.zeros(len(bodies.moving), np.bool_), np.zeros(len(bodies.moving), np.bool_)
-    for k in range(len(out)):
+    unseen, approaches = np.zeros(len(bodies.moving), np.bool_), np.zeros(len(bodies.moving), np.bool_)
+    for k in range(len(unseen)):
         # tracked_s and not age_s: the velocity of a new track was hardly measured, however long something
         # has stood there.
         hardly_tracked = bodies.tracked_s[k] <= MIN_TRACKED_S
         if bodies.moving[k] or hardly_tracked or widest_half_m[k] <= MIN_MOVER_HALF_WIDTH_M:
             continue
-        out[k] = bodies.unseen_s[k] > 0.0
+        unseen[k] = bodies.unseen_s[k] > 0.0
         _, left_m = along_and_left(bodies.xy_m[k, 0] - view.x_m, bodies.xy_m[k, 1] - view.y_m, cos, sin)
         vx, vy = bodies.measured_mps[k]
         _, leftward_mps = along_and_left(vx, vy, cos, sin)
@@ -91,8 +89,8 @@ def unseen_or_approaching(
         if _PERSON_FROM_M <= bodies.top_m[k] <= _PERSON_TO_M:
             sigmas, least_mps = _PERSON_MIN_SIGMAS, _PERSON_MIN_MPS
         clear_mps = max(sigmas * math.sqrt(variance), least_mps)
-        comes[k] = not out[k] and -np.sign(left_m) * leftward_mps > clear_mps
-    return out, comes
+        approaches[k] = not unseen[k] and -np.sign(left_m) * leftward_mps > clear_mps
+    return unseen, approaches
 
 
 @inlined

@@ -56,13 +56,13 @@ def extrapolated(bodies: Bodies, dt_s: float, view: CurrentView) -> FloatArray:
     return xy
 
 
-def pushed_out_of_view(bodies: Bodies, since_s: FloatArray, view: CurrentView, free: FreeSpace) -> Bodies:
+def pushed_out_of_view(bodies: Bodies, missing_s: FloatArray, view: CurrentView, free: FreeSpace) -> Bodies:
     """The bodies, with movers whose expected place is seen to be free moved outwards, out of the view.
 
     They are moved sideways to the edge of the free space, and a velocity towards the axis is replaced by
     its forward component. A body that approaches (by more than one standard deviation) is not moved
     until it is late by EDGE_TOLERANCE_M plus EDGE_TOLERANCE_MPS for each second since it was last seen.
-    since_s (N,): for how long each has been out of view.
+    missing_s (N,): for how long each has been out of view.
     """
     cos, sin = math.cos(view.heading_rad), math.sin(view.heading_rad)
     forward, leftward = np.array([cos, sin]), np.array([-sin, cos])
@@ -86,7 +86,7 @@ def pushed_out_of_view(bodies: Bodies, since_s: FloatArray, view: CurrentView, f
         xy[k] += side[k] * push_out_m * leftward
         if inwards_mps > 0.0:
             velocity[k] = significant_component(velocity[k], covariance[k], forward) * forward
-        turned_mps = _VELOCITY_CHANGE_MPS2 * float(since_s[k])
+        turned_mps = _VELOCITY_CHANGE_MPS2 * float(missing_s[k])
         np.fill_diagonal(covariance[k], np.maximum(np.diagonal(covariance[k]), turned_mps**2))
         unseen_s[k] = 0.0
     return replace(bodies, xy_m=xy, velocity_mps=velocity, covariance=covariance, unseen_s=unseen_s)
