@@ -14,6 +14,7 @@ The files in the order of one control step, each below the one that asks it:
       * turning_vehicles.py - how much nearer the ends of vehicles may swing that turn on the spot
       * known_places.py - which new tracks began where something had stood: no newcomers
       * velocity_filter.py - averages the measured velocities; how fast those who set off may become
+      * leaving_movers.py - which of them set off as they leave the view
       * out_of_view.py - keeps bodies that have left the view
         * unseen_motion.py - which of them move, and with which velocity
         * leftover_strips.py - which of them are only the last visible part of another one

@@ -6,9 +6,10 @@ controller/decision/world_model.py takes the obstacles of each new scene in here
 2. Boxed are movers, such vehicles, and what stands and is neither large nor a mere strip.
 3. known_places.py: which of them are no newcomers, but tracks that were renumbered.
 4. velocity_filter.py: their velocities, averaged.
-5. out_of_view.py: which of them leave the view moving, and which others have left it and still count.
-6. cut_movers.py, turning_vehicles.py: how much nearer than they are seen some of them may be.
-7. lately_moved.py: which of them only pause.
+5. leaving_movers.py: which of them set off as they leave the view.
+6. out_of_view.py: which others have left the view and still count.
+7. cut_movers.py, turning_vehicles.py: how much nearer than they are seen some of them may be.
+8. lately_moved.py: which of them only pause.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from controller.decision.bodies import Bodies, no_bodies
 from controller.decision.cut_movers import with_hidden_near_sides
 from controller.decision.known_places import KnownPlaces
 from controller.decision.lately_moved import LatelyMoved
+from controller.decision.leaving_movers import LeavingMovers
 from controller.decision.out_of_view import OutOfView
 from controller.decision.surfaces import Surfaces
 from controller.decision.turning_vehicles import TurningVehicles, with_swinging_ends
@@ -55,6 +57,7 @@ class KnownBodies:
         self._turning = TurningVehicles(config.margins.stop_m - config.margins.least_m)
         self._known_places = KnownPlaces()
         self._velocity_filter = SteadyVelocities()
+        self._leaving_movers = LeavingMovers()
         self._out_of_view = OutOfView(robot.limits.max_obstacle_speed_mps)
         self._lately_moved = LatelyMoved()
 
@@ -81,7 +84,7 @@ class KnownBodies:
         boxed = _boxed(seen.half_view_m, seen.half_across_m, seen.moving) | (swing_m > 0.0)
         boxes = self._known_places.without_newcomers(seen.select(boxed), seen.ids)
         boxes = self._velocity_filter.update(boxes)
-        boxes = self._out_of_view.mark_leaving_movers(boxes, view)
+        boxes = self._leaving_movers.marked(boxes, view)
         remembered = self._out_of_view.update(self.in_view, boxes, view, standing, free)
         extended = with_hidden_near_sides(boxes, view, self._front_m)
         extended = with_swinging_ends(extended, swing_m[boxed], view, self._front_m)

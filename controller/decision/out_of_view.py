@@ -1,7 +1,7 @@
 """Bodies that have left the camera's view but are still there: below, beside or above it.
 
-controller/decision/world_model.py calls OutOfView.mark_leaving_movers, then OutOfView.update, once a scene. A
-body of the last scene that is missing in this one is kept while its place is not seen:
+controller/decision/known_bodies.py calls OutOfView once a scene. A body of the last scene that is missing in
+this one is kept while its place is not seen:
 
 * Standing (seen for at least 0.5 s; the robot drives): kept where it was, until its place is seen again (free
   or with a surface in it), a seen body covers it, or it lies 2 m behind the camera. If it goes missing while
@@ -11,9 +11,9 @@ body of the last scene that is missing in this one is kept while its place is no
   standing (controller/decision/unseen_motion.py).
 * Moving otherwise: extrapolated with its last velocity for 2 s, or for 6 s if that leads towards the robot's
   axis or along with the robot. Dropped earlier if its place is well within the view or 2 m behind the camera.
-* Judged standing (a verdict takes some frames), but clearly measured as approaching (or as moving anywhere,
-  if seen for 0.5 to 1 s): counts as moving, with the velocity measured last, even if the robot stands
-  (controller/decision/unseen_motion.py).
+* Judged standing (a verdict takes some frames), but clearly measured as approaching, or as moving anywhere if
+  it was seen for 0.5 to 1 s: counts as moving, with the velocity measured last, even if the robot stands
+  (controller/decision/leaving_movers.py, unseen_motion.py).
 * Moving, and expected in view where the scene shows free floor: moved sideways to the edge of the free space,
   and no longer approaching (its velocity towards the axis becomes 0, its variance grows). The same 2 s or
   6 s apply. A body that clearly approached may first be some decimetres late.
@@ -41,14 +41,11 @@ from controller.decision.leftover_strips import first_strips, leftover_strips
 from controller.decision.seen_through import SeenThrough, unproven
 from controller.decision.unseen_motion import (
     agrees,
-    as_tall_as_a_person,
     may_enter_way,
     stopped_below_view,
-    unseen_or_approaching,
     with_measured_velocity,
 )
 from controller.decision.unseen_position import extrapolated, pushed_out_of_view
-from controller.decision.velocity_filter import missing_to_walking
 from controller.decision.view_edges import CurrentView, out_of_view
 from hal.clocks import NS_PER_S
 from hal.compiled import compiled
@@ -62,13 +59,10 @@ IntArray = NDArray[np.int64]
 _SAME_PLACE_M = 0.25
 # How long a mover is kept: in general, and if it may come into the robot's way.
 _MOVING_KEPT_S, _MAY_ENTER_KEPT_S = 2.0, 6.0
-# A body as tall as a person that approached up to this time before it was last seen has set off: one more
-# measurement, of what the edge of the view leaves of it, does not prove the opposite.
-_LATELY_NS = 200_000_000
 
 
 class OutOfView:
-    """The bodies out of view; call mark_leaving_movers, then update, once a scene.
+    """The bodies out of view; call update once a scene.
 
     max_obstacle_speed_mps: measured speeds far above it (IMPLAUSIBLE_SPEED_FACTOR times) are mistakes.
     """
@@ -79,36 +73,6 @@ class OutOfView:
         self._bodies = no_bodies(0)
         self._missing_s: FloatArray = np.zeros(0)  # for how long each has been missing
         self._stands_since_ns: int | None = None
-        # Of bodies that are judged standing but clearly approached: by id, when last, and how fast.
-        self._approached: dict[int, tuple[int, FloatArray]] = {}
-        self._widest_of, self._widest_half_m = np.zeros(0, np.int64), np.zeros(0)
-
-    def mark_leaving_movers(self, seen: Bodies, view: CurrentView) -> Bodies:
-        """The seen bodies, of which some that are judged standing are made moving.
-
-        These are the ones that approached the robot's axis when last seen or just before, which perception
-        now only predicts (unseen_s > 0), and whose place is out of view. They set off with that velocity.
-        """
-        if not len(seen):
-            self._widest_of, self._approached = seen.ids, {}
-            return seen
-        # The edge of the view cuts bodies off, so the present width says little.
-        self._widest_half_m = _widest(seen.ids, seen.half_across_m, self._widest_of, self._widest_half_m)
-        self._widest_of = seen.ids
-        unseen, approaches = unseen_or_approaching(seen, self._widest_half_m, view)
-        if not self._approached and not np.count_nonzero(approaches):
-            return seen
-        self._approached = self._lately_approached(seen, unseen, approaches)
-        ids = seen.ids.tolist()
-        approached = np.array([one in self._approached for one in ids], np.bool_)
-        leaves = unseen & approached & out_of_view(seen, view)
-        if not np.count_nonzero(leaves):
-            return seen
-        velocity = seen.velocity_mps.copy()
-        velocity[leaves] = [self._approached[ids[k]][1] for k in np.flatnonzero(leaves).tolist()]
-        innovation = np.where(leaves[:, None], missing_to_walking(velocity), seen.innovation_mps)
-        moving = seen.moving | leaves
-        return replace(seen, velocity_mps=velocity, innovation_mps=innovation, moving=moving)
 
     def update(
         self, before: Bodies, seen: Bodies, view: CurrentView, standing: bool, free: FreeSpace
@@ -146,23 +110,6 @@ class OutOfView:
             bodies = pushed_out_of_view(bodies, missing_s, view, free)
         self._bodies = bodies
         return bodies
-
-    def _lately_approached(
-        self, seen: Bodies, unseen: BoolArray, approaches: BoolArray
-    ) -> dict[int, tuple[int, FloatArray]]:
-        """Which bodies that are judged standing have lately approached: when last, and how fast.
-
-        unseen, approaches (N,): see unseen_or_approaching().
-        """
-        now_ns, lately = seen.captured_ns, {}
-        stands_tall = ~seen.moving & as_tall_as_a_person(seen)
-        for k, track_id in enumerate(seen.ids.tolist()):
-            before = self._approached.get(track_id)
-            if approaches[k]:
-                lately[track_id] = now_ns, seen.measured_mps[k]
-            elif before is not None and (unseen[k] or (stands_tall[k] and now_ns - before[0] <= _LATELY_NS)):
-                lately[track_id] = before
-        return lately
 
     def _with_missing(
         self, before: Bodies, seen: Bodies, dt_s: float, view: CurrentView
@@ -242,17 +189,3 @@ def _kept(
             if part_of or seen.ids[m] == bodies.ids[k]:
                 kept[k] = False
     return kept
-
-
-@compiled("int64[:], float64[:], int64[:], float64[:]")
-def _widest(ids: IntArray, half_m: FloatArray, before_ids: IntArray, before_half_m: FloatArray) -> FloatArray:
-    """(N,) half of the greatest width with which each of ids (N,) was ever seen.
-
-    half_m (N,): the half widths now. before_half_m (M,): the greatest ones before, of before_ids (M,).
-    """
-    greatest = half_m.copy()
-    for k in range(len(ids)):
-        for m in range(len(before_ids)):
-            if ids[k] == before_ids[m]:
-                greatest[k] = max(greatest[k], before_half_m[m])
-    return greatest

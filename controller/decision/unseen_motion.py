@@ -1,4 +1,4 @@
-"""Which bodies that are out of view, or about to leave it, move, and with which velocity they go on.
+"""Which bodies that are out of view move, and with which velocity they go on.
 
 controller/decision/out_of_view.py asks these questions once a scene. Everything is in the frame of the path.
 """
@@ -21,10 +21,7 @@ BoolArray = NDArray[np.bool_]
 
 # A body that is judged standing counts as approaching if it is faster than both thresholds. Noise makes
 # standing things beside the view seem to creep now and then; lower thresholds would slow the robot each time.
-_APPROACH_MIN_SIGMAS, _APPROACH_MIN_MPS = 3.3, 0.2
-# Lower thresholds for what is as tall as a person: few racks and crates are, so noise slows the robot rarely.
-_PERSON_MIN_SIGMAS, _PERSON_MIN_MPS = 2.5, 0.15
-_PERSON_FROM_M, _PERSON_TO_M = 1.2, 2.2
+APPROACH_MIN_SIGMAS, APPROACH_MIN_MPS = 3.3, 0.2
 # No person or vehicle is as narrow as this, but ends of racks are. Half of the greatest width that was seen.
 MIN_MOVER_HALF_WIDTH_M = 0.1
 # A speed above this many standard deviations is certain: the body will not be found where it was last seen.
@@ -38,11 +35,6 @@ _ALONG_TO_OUTWARD_RATIO = 4.0
 _AT_REST_SIGMAS, _AT_REST_MPS = 2.5, 0.25
 # Velocities that differ by more standard deviations than this belong to two different bodies.
 _SAME_VELOCITY_SIGMAS = 2.0
-
-
-def as_tall_as_a_person(bodies: Bodies) -> BoolArray:
-    """(N,) which bodies are."""
-    return np.asarray((bodies.top_m >= _PERSON_FROM_M) & (bodies.top_m <= _PERSON_TO_M))
 
 
 def significant_component(velocity_mps: FloatArray, covariance: FloatArray, along: FloatArray) -> float:
@@ -59,38 +51,6 @@ def leftward_variance(covariance: FloatArray, cos: float, sin: float) -> float:
     """
     mixed = covariance[0, 1] + covariance[1, 0]
     return float((covariance[0, 0] * sin - mixed * cos) * sin + covariance[1, 1] * cos * cos)
-
-
-@compiled(Bodies, "float64[:]", CurrentView)
-def unseen_or_approaching(
-    bodies: Bodies, widest_half_m: FloatArray, view: CurrentView
-) -> tuple[BoolArray, BoolArray]:
-    """Two masks (N,) of the bodies judged standing: not seen in this scene; and seen, but approaching.
-
-    Approaching: the measured velocity towards the robot's axis (the line straight ahead of it) exceeds
-    the noise; of a body as tall as a person, less suffices. A body is in neither mask if it was tracked for
-    MIN_TRACKED_S or less, or was never wider than MIN_MOVER_HALF_WIDTH_M. widest_half_m (N,): half of the
-    greatest width that each was seen with.
-    """
-    cos, sin = math.cos(view.heading_rad), math.sin(view.heading_rad)
-    unseen, approaches = np.zeros(len(bodies.moving), np.bool_), np.zeros(len(bodies.moving), np.bool_)
-    for k in range(len(unseen)):
-        # tracked_s and not age_s: the velocity of a new track was hardly measured, however long something
-        # has stood there.
-        hardly_tracked = bodies.tracked_s[k] <= MIN_TRACKED_S
-        if bodies.moving[k] or hardly_tracked or widest_half_m[k] <= MIN_MOVER_HALF_WIDTH_M:
-            continue
-        unseen[k] = bodies.unseen_s[k] > 0.0
-        _, left_m = along_and_left(bodies.xy_m[k, 0] - view.x_m, bodies.xy_m[k, 1] - view.y_m, cos, sin)
-        vx, vy = bodies.measured_mps[k]
-        _, leftward_mps = along_and_left(vx, vy, cos, sin)
-        variance = leftward_variance(bodies.covariance[k], cos, sin)
-        sigmas, least_mps = _APPROACH_MIN_SIGMAS, _APPROACH_MIN_MPS
-        if _PERSON_FROM_M <= bodies.top_m[k] <= _PERSON_TO_M:
-            sigmas, least_mps = _PERSON_MIN_SIGMAS, _PERSON_MIN_MPS
-        clear_mps = max(sigmas * math.sqrt(variance), least_mps)
-        approaches[k] = not unseen[k] and -np.sign(left_m) * leftward_mps > clear_mps
-    return unseen, approaches
 
 
 @inlined
@@ -114,7 +74,7 @@ def with_measured_velocity(bodies: Bodies, mistaken_mps: float) -> Bodies:
     The verdict of perception takes some frames. A mover that leaves the view before its verdict would be
     remembered as standing where it no longer is, and the robot would wait for it without end. So bodies
     tracked for MIN_TRACKED_S to _VERDICT_TRUSTED_S count as moving if their measured speed is above
-    _SURE_MOVE_SIGMAS and _APPROACH_MIN_MPS. A speed above mistaken_mps is an error of measurement and is not
+    _SURE_MOVE_SIGMAS and APPROACH_MIN_MPS. A speed above mistaken_mps is an error of measurement and is not
     used.
     """
     goes = _moves_before_verdict(bodies, _SURE_MOVE_SIGMAS, mistaken_mps)
@@ -155,7 +115,7 @@ def stopped_below_view(bodies: Bodies, view: CurrentView) -> BoolArray:
 
 def hardly_stood(bodies: Bodies) -> BoolArray:
     """(N,) which bodies were judged standing before a verdict can be trusted, and measured as moving."""
-    return _moves_before_verdict(bodies, _APPROACH_MIN_SIGMAS, math.inf)
+    return _moves_before_verdict(bodies, APPROACH_MIN_SIGMAS, math.inf)
 
 
 @inlined
@@ -188,13 +148,13 @@ def _moves_before_verdict(bodies: Bodies, sigmas: float, max_mps: float) -> Bool
     """(N,) which bodies are judged standing and tracked for MIN_TRACKED_S to _VERDICT_TRUSTED_S only, but
     were measured as moving.
 
-    Their speed is above this many standard deviations, above _APPROACH_MIN_MPS, and at most max_mps.
+    Their speed is above this many standard deviations, above APPROACH_MIN_MPS, and at most max_mps.
     """
     moves = np.zeros(len(bodies.moving), np.bool_)
     for k in range(len(moves)):
         if bodies.moving[k] or not MIN_TRACKED_S <= bodies.tracked_s[k] < _VERDICT_TRUSTED_S:
             continue
         squared, variance = _squared_and_variance(bodies.measured_mps[k], bodies.covariance[k])
-        fast = squared**2 > sigmas**2 * variance and squared > _APPROACH_MIN_MPS**2
+        fast = squared**2 > sigmas**2 * variance and squared > APPROACH_MIN_MPS**2
         moves[k] = fast and math.sqrt(squared) <= max_mps
     return moves

@@ -10,6 +10,7 @@ import pytest
 from config.decision import DecisionConfig
 from config.robot import Limits, Robot
 from controller.decision.bodies import Bodies, no_bodies
+from controller.decision.leaving_movers import LeavingMovers
 from controller.decision.out_of_view import OutOfView
 from controller.decision.view_edges import view_from
 from controller.decision.world_model import WorldModel
@@ -45,8 +46,8 @@ def expected(bodies: Bodies, left_mps: float = 0.0) -> Bodies:
 
 def after(*scenes: Bodies) -> Bodies:
     """The bodies of the last of some scenes."""
-    memory = new_memory()
-    return [memory.mark_leaving_movers(scene, VIEW) for scene in scenes][-1]
+    leaving = LeavingMovers()
+    return [leaving.marked(scene, VIEW) for scene in scenes][-1]
 
 
 def test_approaching_body_that_leaves_the_view_counts_as_moving() -> None:
