@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from config.decision import SightConfig
 from hal.compiled import compiled, inlined
 from hal.records import record
-from hal.types import Integers, Vector
+from hal.types import Flags, Integers, Vector
 
 IntArray = NDArray[np.intp]
 
@@ -88,7 +88,7 @@ class BlindCorners:
     def look(
         self,
         surfaces: SurfacesOnPath,
-        hides: NDArray[np.bool_],
+        hides: Flags,
         band_tan: float,
         front_s_m: float,
     ) -> None:
@@ -165,7 +165,7 @@ def _ends_blind(points: SurfacesOnPath, first: int, last: int, inward: int, band
 
 
 @compiled(SurfacesOnPath, "boolean[:]", _Corner)
-def _closed(points: SurfacesOnPath, hides: NDArray[np.bool_], corner: _Corner) -> bool:
+def _closed(points: SurfacesOnPath, hides: Flags, corner: _Corner) -> bool:
     """Whether no passage can begin at the corner: what stands there leaves no gap as wide.
 
     A post or a box in front of a rack's goods hides a strip of them from afar, and the strip grows narrower
@@ -191,7 +191,7 @@ def _closed(points: SurfacesOnPath, hides: NDArray[np.bool_], corner: _Corner) -
 @compiled(SurfacesOnPath, "boolean[:], float64, float64, float64")
 def _blind_ends(
     points: SurfacesOnPath,
-    hides: NDArray[np.bool_],
+    hides: Flags,
     band_tan: float,
     front_s_m: float,
     max_beside_m: float,

@@ -7,12 +7,11 @@ from dataclasses import replace
 from operator import attrgetter
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hal.compiled import compiled, inlined
 from hal.directions import along_and_left
 from hal.records import record
-from hal.types import Flags, FloatArray, Integers, Matrices, Matrix, Vector
+from hal.types import FlagMatrix, Flags, FloatArray, Integers, Matrices, Matrix, Vector
 
 # Minimum time for which a body must have been seen before it is remembered out of view or its velocity used.
 MIN_TRACKED_S = 0.5
@@ -55,7 +54,7 @@ class Bodies:
     def __len__(self) -> int:
         return len(self.ids)
 
-    def select(self, chosen: NDArray[np.bool_]) -> Bodies:
+    def select(self, chosen: Flags) -> Bodies:
         """Only the bodies in the mask chosen (N,)."""
         rows = chosen.nonzero()[0]
         if len(rows) == len(chosen):
@@ -98,7 +97,7 @@ class Bodies:
         pairs = zip(_arrays_of(self), _arrays_of(other), strict=True)
         return Bodies(self.captured_ns, *map(np.concatenate, pairs))
 
-    def covers(self, points_m: FloatArray, reach_m: FloatArray, side_m: float) -> NDArray[np.bool_]:
+    def covers(self, points_m: FloatArray, reach_m: FloatArray, side_m: float) -> FlagMatrix:
         """(P, N) which floor points (P, 2) lie on which body; reach_m (P,) along the view, side_m across."""
         return _covers(self, points_m, reach_m, side_m)
 
@@ -138,7 +137,7 @@ def extended_towards(bodies: Bodies, by_m: FloatArray, heading_rad: float) -> Bo
 
 
 @inlined
-def covering(bodies: Bodies, points_m: FloatArray, reach_m: FloatArray, side_m: float) -> NDArray[np.bool_]:
+def covering(bodies: Bodies, points_m: FloatArray, reach_m: FloatArray, side_m: float) -> FlagMatrix:
     """As Bodies.covers, for compiled steps."""
     covered = np.empty((len(points_m), len(bodies.xy_m)), np.bool_)
     for k in range(len(bodies.xy_m)):
@@ -152,5 +151,5 @@ def covering(bodies: Bodies, points_m: FloatArray, reach_m: FloatArray, side_m: 
 
 
 @compiled(Bodies, "float64[:, :], float64[:], float64")
-def _covers(bodies: Bodies, points_m: FloatArray, reach_m: FloatArray, side_m: float) -> NDArray[np.bool_]:
+def _covers(bodies: Bodies, points_m: FloatArray, reach_m: FloatArray, side_m: float) -> FlagMatrix:
     return covering(bodies, points_m, reach_m, side_m)

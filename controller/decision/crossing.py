@@ -18,7 +18,7 @@ from controller.decision.corridor import Placed
 from controller.profile import SpeedRamps
 from hal.compiled import compiled, inlined
 from hal.records import record
-from hal.types import FloatArray
+from hal.types import Flags, FloatArray
 
 # The spread of the sideways velocity makes an entry less likely, but by no more than this distance: a body
 # that heads for the corridor must not count as unlikely to enter only because it needs long to get there.
@@ -48,7 +48,7 @@ def likely_enters(
     times_s: FloatArray,
     sigma_side_mps: FloatArray,
     position_uncertainty_m: FloatArray | None = None,
-) -> NDArray[np.bool_]:
+) -> Flags:
     """(N,) which bodies are, or are likely to come, within the swept width. times_s (K,) begins at 0 = now.
 
     Likely: even if the sideways velocity is less by its spread, so that noise does not make the robot brake.
@@ -163,7 +163,7 @@ def _interpolated(t_s: float, times_s: FloatArray, values: FloatArray) -> float:
 @compiled("float64[:, :], float64[:], float64[:], float64[:]")
 def _likely_enters(
     clearance_m: FloatArray, times_s: FloatArray, sigma_mps: FloatArray, nearer_m: FloatArray
-) -> NDArray[np.bool_]:
+) -> Flags:
     """(N,) which bodies' clearance is 0 or less now, or is likely to be at some time."""
     found = np.zeros(len(clearance_m), np.bool_)
     for k in range(len(clearance_m)):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-BoolArray = NDArray[np.bool_]
+from hal.types import Flags
 
 
 class Debounced:
@@ -20,13 +20,13 @@ class Debounced:
         """Note a break in the observations: times start anew after it. The flags stay as they are."""
         self._otherwise_since_s.clear()
 
-    def flags(self, ids: NDArray[np.int64]) -> BoolArray:
+    def flags(self, ids: NDArray[np.int64]) -> Flags:
         """(N,) the flags of ids as they are; a new one is False."""
         return np.fromiter(
             (self._flags.get(track_id, False) for track_id in ids.tolist()), np.bool_, len(ids)
         )
 
-    def update(self, ids: NDArray[np.int64], seen: BoolArray, at_once: BoolArray, now_s: float) -> BoolArray:
+    def update(self, ids: NDArray[np.int64], seen: Flags, at_once: Flags, now_s: float) -> Flags:
         """(N,) the flags of ids at now_s; other ids are forgotten, and a new one begins with False.
 
         seen (N,): what is seen now. at_once (N,): where the flag follows it without delay.

@@ -8,10 +8,10 @@ controller/decision/world_model.py asks once a scene.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from controller.decision.bodies import Bodies
 from hal.clocks import NS_PER_S
+from hal.types import Flags
 
 # Who has moved for _MOVED_NS in one go may go on within _PAUSE_NS.
 _MOVED_NS, _PAUSE_NS = NS_PER_S // 2, 4 * NS_PER_S
@@ -34,7 +34,7 @@ class LatelyMoved:
             if now_ns - since >= _MOVED_NS:
                 self._moved_ns[track_id] = now_ns
 
-    def pausing(self, bodies: Bodies) -> NDArray[np.bool_]:
+    def pausing(self, bodies: Bodies) -> Flags:
         """(N,) which of the bodies stand, but only pause."""
         moved_ns = self._moved_ns
         lately = np.array([track_id in moved_ns for track_id in bodies.ids.tolist()], np.bool_)

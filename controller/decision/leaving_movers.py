@@ -23,9 +23,8 @@ from controller.decision.velocity_filter import missing_to_walking
 from controller.decision.view_edges import CurrentView, out_of_view
 from hal.compiled import compiled
 from hal.directions import along_and_left
-from hal.types import FloatArray
+from hal.types import Flags, FloatArray
 
-BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.int64]
 
 # Lower thresholds for what is as tall as a person: few racks and crates are, so noise slows the robot rarely.
@@ -75,7 +74,7 @@ class LeavingMovers:
         return replace(seen, velocity_mps=velocity, innovation_mps=innovation, moving=moving)
 
     def _lately_approached(
-        self, seen: Bodies, unseen: BoolArray, approaches: BoolArray
+        self, seen: Bodies, unseen: Flags, approaches: Flags
     ) -> dict[int, tuple[int, FloatArray]]:
         """Which bodies that are judged standing have lately approached: when last, and how fast.
 
@@ -92,7 +91,7 @@ class LeavingMovers:
         return lately
 
 
-def _as_tall_as_a_person(bodies: Bodies) -> BoolArray:
+def _as_tall_as_a_person(bodies: Bodies) -> Flags:
     """(N,) which bodies are."""
     return np.asarray((bodies.top_m >= _PERSON_FROM_M) & (bodies.top_m <= _PERSON_TO_M))
 
@@ -100,7 +99,7 @@ def _as_tall_as_a_person(bodies: Bodies) -> BoolArray:
 @compiled(Bodies, "float64[:]", CurrentView)
 def _unseen_or_approaching(
     bodies: Bodies, widest_half_m: FloatArray, view: CurrentView
-) -> tuple[BoolArray, BoolArray]:
+) -> tuple[Flags, Flags]:
     """Two masks (N,) of the bodies judged standing: not seen in this scene; and seen, but approaching.
 
     Approaching: the measured velocity towards the robot's axis (the line straight ahead of it) exceeds

@@ -12,7 +12,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from controller.decision.bodies import MIN_TRACKED_S, Bodies
 from controller.decision.unseen_motion import (
@@ -20,7 +19,7 @@ from controller.decision.unseen_motion import (
     hardly_stood,
     velocities_agree,
 )
-from hal.types import FloatArray
+from hal.types import Flags, FloatArray
 
 # A strip this near to a kept mover, across the view, may be a part of it. If it was judged standing, also
 # along the view: its place follows the edge of the view while the mover goes on.
@@ -29,7 +28,7 @@ _REACH_M = 0.5
 _OVERLAP_S = 0.3
 
 
-def leftover_strips(bodies: Bodies, kept: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def leftover_strips(bodies: Bodies, kept: Flags) -> Flags:
     """(N,) which of the bodies kept (N,) are leftover strips.
 
     They lie beside a mover that is kept and was seen for longer, and have its velocity. Either they were seen
@@ -48,7 +47,7 @@ def leftover_strips(bodies: Bodies, kept: NDArray[np.bool_]) -> NDArray[np.bool_
     return np.asarray(strips & (beside & alike).any(axis=1))
 
 
-def first_strips(bodies: Bodies, missing_s: FloatArray, seen: Bodies) -> NDArray[np.bool_]:
+def first_strips(bodies: Bodies, missing_s: FloatArray, seen: Bodies) -> Flags:
     """(N,) which of the bodies, missing for missing_s (N,), were the first visible parts of seen movers.
 
     They moved, were seen for MIN_TRACKED_S at most, and a mover has come into view near their place since. It

@@ -11,13 +11,10 @@ from __future__ import annotations
 from collections import deque
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hal.compiled import compiled
-from hal.types import FloatArray
+from hal.types import Flags, FloatArray
 from vision.scene import FreeSpace
-
-BoolArray = NDArray[np.bool_]
 
 COVERED = "right before the camera nothing is seen, neither floor nor what stands on it"
 
@@ -69,7 +66,7 @@ class LensCover:
         )
 
 
-def _blank(free: FreeSpace) -> BoolArray:
+def _blank(free: FreeSpace) -> Flags:
     """(B,) bands without any data; taken from the scan itself if perception does not tell."""
     if free.blank is not None:
         return free.blank
@@ -78,8 +75,8 @@ def _blank(free: FreeSpace) -> BoolArray:
 
 @compiled("float64[:], boolean[:], boolean[:], float64, float64")
 def _right_ahead(
-    bearing_tan: FloatArray, blank: BoolArray, shown: BoolArray, half_width_m: float, left_m: float
-) -> tuple[BoolArray, int, int, int]:
+    bearing_tan: FloatArray, blank: Flags, shown: Flags, half_width_m: float, left_m: float
+) -> tuple[Flags, int, int, int]:
     """What the B bands show, of which blank (B,) show nothing now and shown (B,) showed something before.
 
     Returns which bands have ever shown something (B,); the length of the longest run of bands right ahead

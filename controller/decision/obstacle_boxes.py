@@ -8,13 +8,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from controller.decision.bodies import Bodies, no_bodies
 from controller.decision.situation import SceneError
 from hal.compiled import compiled, inlined
 from hal.geometry import camera_in_body
-from hal.types import CameraMount, FloatArray, PlanarPose, Pose
+from hal.types import CameraMount, Flags, FloatArray, PlanarPose, Pose
 from vision.scene import Scene
 
 # Nothing in a hall is farther away, larger or faster: such numbers are faults of perception.
@@ -95,7 +94,7 @@ def _boxes(
     measured: FloatArray,
     age_s: FloatArray,
     unseen_s: FloatArray,
-    moving: NDArray[np.bool_],
+    moving: Flags,
     depth_m: float,
     camera: Pose,
     robot: PlanarPose,

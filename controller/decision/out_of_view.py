@@ -49,10 +49,9 @@ from controller.decision.unseen_position import extrapolated, pushed_out_of_view
 from controller.decision.view_edges import CurrentView, out_of_view
 from hal.clocks import NS_PER_S
 from hal.compiled import compiled
-from hal.types import FloatArray
+from hal.types import Flags, FloatArray
 from vision.scene import FreeSpace
 
-BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.int64]
 
 # A seen body covers the place of a kept one within this distance across the view.
@@ -133,7 +132,7 @@ class OutOfView:
         gone = gone.select(~_parts_of_movers(gone, seen))
         return bodies.joined(gone), np.concatenate((missing_s, np.full(len(gone), dt_s)))
 
-    def _last_seen_driving(self, bodies: Bodies) -> BoolArray:
+    def _last_seen_driving(self, bodies: Bodies) -> Flags:
         """(N,) which bodies were last seen before the robot came to rest, if it stands now.
 
         Perception predicts what it no longer sees for a while, and meanwhile the robot may have stopped. In
@@ -145,7 +144,7 @@ class OutOfView:
 
 
 @compiled("int64[:], int64[:]")
-def _missing(ids: IntArray, seen_ids: IntArray) -> BoolArray:
+def _missing(ids: IntArray, seen_ids: IntArray) -> Flags:
     """(N,) which of ids (N,) are not among seen_ids (M,)."""
     missing = np.empty(len(ids), np.bool_)
     for k in range(len(ids)):
@@ -154,7 +153,7 @@ def _missing(ids: IntArray, seen_ids: IntArray) -> BoolArray:
 
 
 @compiled(Bodies, Bodies)
-def _parts_of_movers(gone: Bodies, seen: Bodies) -> BoolArray:
+def _parts_of_movers(gone: Bodies, seen: Bodies) -> Flags:
     """(N,) which of the bodies that have just gone were parts of movers that are seen.
 
     They were seen for MIN_TRACKED_S at most, so that their velocity is hardly known, and a mover is seen
@@ -170,9 +169,7 @@ def _parts_of_movers(gone: Bodies, seen: Bodies) -> BoolArray:
 
 
 @compiled(Bodies, "float64[:]", Bodies, "boolean[:]", CurrentView)
-def _kept(
-    bodies: Bodies, missing_s: FloatArray, seen: Bodies, out: BoolArray, view: CurrentView
-) -> BoolArray:
+def _kept(bodies: Bodies, missing_s: FloatArray, seen: Bodies, out: Flags, view: CurrentView) -> Flags:
     """(N,) which bodies, missing for missing_s (N,), are out of view (N,) and not part of a seen one.
 
     Movers are kept for a limited time only.

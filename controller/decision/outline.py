@@ -10,13 +10,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from controller.decision.bodies import Bodies
 from controller.decision.corridor import Corridor
 from controller.decision.surfaces import Surfaces
 from hal.records import record
-from hal.types import FloatArray
+from hal.types import Flags, FloatArray
 
 # If the outline has a wider gap, in bands, some part of the body was not seen.
 _GAP_BANDS = 2.5
@@ -42,7 +41,7 @@ class Outline:
 def outline_of(
     bodies: Bodies,
     k: int,
-    own: NDArray[np.bool_],
+    own: Flags,
     surfaces: Surfaces,
     corridor: Corridor,
     stretch_m: tuple[float, float],
@@ -78,7 +77,7 @@ def _seen_throughout(across_m: FloatArray, half_band_m: FloatArray, half_m: floa
     return bool(np.diff(edges).max() <= _GAP_BANDS * 2.0 * float(half_band_m.max()))
 
 
-def _ends_in_view(surfaces: Surfaces, own: NDArray[np.bool_]) -> bool:
+def _ends_in_view(surfaces: Surfaces, own: Flags) -> bool:
     """Whether farther things are seen beside both ends of the surfaces own (P,).
 
     Else the body may go on: beyond the edge of the view, where nothing was measured, or behind something

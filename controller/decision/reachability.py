@@ -18,14 +18,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from controller.decision.corridor import Placed
 from controller.decision.manoeuvres import Manoeuvres
 from controller.profile import SpeedRamps
 from hal.compiled import compiled
 from hal.records import record
-from hal.types import FlagMatrix, FloatArray, Matrix
+from hal.types import FlagMatrix, Flags, FloatArray, Matrix
 
 _STOPPED_MPS = 0.02  # at the end of a stop, a slower robot counts as one that has stopped
 
@@ -49,7 +48,7 @@ def reach(
     manoeuvres: Manoeuvres,
     max_mps: float,
     margin_m: float,
-    counts: NDArray[np.bool_],
+    counts: Flags,
 ) -> Reach:
     """Grow N bodies by what they could do until times_s (K,) from now.
 
@@ -89,8 +88,8 @@ def _grown(
     by: Manoeuvres,
     max_mps: float,
     margin_m: float,
-    counts: NDArray[np.bool_],
-) -> tuple[NDArray[np.bool_], FloatArray, FloatArray]:
+    counts: Flags,
+) -> tuple[FlagMatrix, FloatArray, FloatArray]:
     """The fields of Reach."""
     shape = len(by.since_s), len(times_s)
     inside, lo, hi = np.empty(shape, np.bool_), np.empty(shape), np.empty(shape)
@@ -116,7 +115,7 @@ def _grown(
 
 
 @compiled(Stops, "float64", Reach, "boolean[:]")
-def count_safe_stops(stopping: Stops, s_m: float, reached: Reach, counts: NDArray[np.bool_]) -> int:
+def count_safe_stops(stopping: Stops, s_m: float, reached: Reach, counts: Flags) -> int:
     """How many of the R stops, from the first one on, touch none of the bodies in the mask counts (N,).
 
     The robot starts at s_m. Once it stands, being touched is no fault of its own.

@@ -13,12 +13,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from controller.decision.bodies import Bodies
 from controller.decision.view_edges import CurrentView, ahead_and_left, is_below_or_above_view
 from hal.compiled import compiled, inlined
 from hal.geometry import wrap_angle_rad
+from hal.types import Flags
 from vision.scene import FreeSpace
 
 # Only bodies this far inside the side edges are judged: a smaller distance may be an error of the robot's
@@ -49,7 +49,7 @@ class SeenThrough:
         """Start anew: the robot drives, or nothing is remembered."""
         self._since_ns.clear()
 
-    def seen_empty(self, bodies: Bodies, view: CurrentView, free: FreeSpace) -> NDArray[np.bool_]:
+    def seen_empty(self, bodies: Bodies, view: CurrentView, free: FreeSpace) -> Flags:
         """(N,) which bodies are no longer there, for a robot that stands. Call once a scene."""
         if not abs(wrap_angle_rad(view.heading_rad - self._heading_rad)) <= _STANDS_RAD:
             self.forget()
@@ -89,7 +89,7 @@ def _covered_bands(
 
 
 @compiled(Bodies, CurrentView, FreeSpace)
-def _seen_empty(bodies: Bodies, view: CurrentView, free: FreeSpace) -> NDArray[np.bool_]:
+def _seen_empty(bodies: Bodies, view: CurrentView, free: FreeSpace) -> Flags:
     """(N,) which standing bodies are well in view, and all bands that they cover are seen free."""
     empty = np.zeros(len(bodies.moving), np.bool_)
     for k in range(len(empty)):
@@ -105,7 +105,7 @@ def _seen_empty(bodies: Bodies, view: CurrentView, free: FreeSpace) -> NDArray[n
 
 
 @compiled(Bodies, CurrentView, FreeSpace)
-def unproven(bodies: Bodies, view: CurrentView, free: FreeSpace) -> NDArray[np.bool_]:
+def unproven(bodies: Bodies, view: CurrentView, free: FreeSpace) -> Flags:
     """(N,) which bodies that surely stood are in view and near, but their place is not seen in this scene.
 
     It is seen if every band that the body covers is free beyond it, or if one ends at a surface there.

@@ -12,7 +12,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from config.decision import DecisionConfig
 from controller.decision.blind_corners import LOW_M, BlindCorners, SurfacesOnPath
@@ -23,10 +22,8 @@ from controller.decision.known_floor import KnownFloor
 from controller.decision.surfaces import Surfaces
 from controller.decision.view_edges import MIN_TAN, may_be_above_view_within_m
 from hal.compiled import compiled
-from hal.types import CameraMount, FloatArray, PlanarPose
+from hal.types import CameraMount, FlagMatrix, Flags, FloatArray, PlanarPose
 from vision.scene import FreeSpace
-
-BoolArray = NDArray[np.bool_]
 
 # If the view's upper edge hardly rises, a surface that vanishes farther away than this has not gone out of
 # view upwards: it was flicker.
@@ -103,7 +100,7 @@ class Sight:
         self._surface.note(nearest, s_m, blind_s_m, captured_ns, standing, explained_s)
         self._floor.look(free, pose, s_m, captured_ns, found.in_bands)
 
-    def _explained(self, on_path: SurfacesOnPath, explained: BoolArray, nearest: BoolArray) -> float:
+    def _explained(self, on_path: SurfacesOnPath, explained: Flags, nearest: Flags) -> float:
         """Path coordinate of the surface in the corridor that bodies explain, where the nearest unexplained
         one was last seen across the path; inf: they cover too little of it.
 
@@ -152,20 +149,20 @@ class _InCorridor(NamedTuple):
     stands: (P,) those, in the corridor or not, that belong to no mover.
     """
 
-    in_bands: BoolArray
-    explained: BoolArray
-    nearest: BoolArray
+    in_bands: Flags
+    explained: Flags
+    nearest: Flags
     nearest_s_m: float
     clearance_m: float
-    stands: BoolArray
+    stands: Flags
 
 
 @compiled(SurfacesOnPath, "float64[:], boolean[:, :], boolean[:], float64, float64, int64")
 def _surfaces_in_corridor(
     on_path: SurfacesOnPath,
     half_band_m: FloatArray,
-    belongs: BoolArray,
-    moving: BoolArray,
+    belongs: FlagMatrix,
+    moving: Flags,
     s_m: float,
     lateral_m: float,
     bands_count: int,

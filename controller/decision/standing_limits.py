@@ -31,7 +31,7 @@ from controller.decision.view_edges import visible_from_m
 from controller.decision.world_model import WorldModel
 from hal.compiled import compiled
 from hal.records import record
-from hal.types import FloatArray
+from hal.types import Flags, FloatArray
 
 # Beside the robot (its front is past the near side) only a body this far inside the corridor counts.
 _INSIDE_BODY_M = 0.05
@@ -191,9 +191,7 @@ class StandingLimits:
 
 
 @compiled("boolean[:], float64[:], float64, float64")
-def _stands_within(
-    moving: NDArray[np.bool_], clearance_m: FloatArray, above_m: float, up_to_m: float
-) -> NDArray[np.bool_]:
+def _stands_within(moving: Flags, clearance_m: FloatArray, above_m: float, up_to_m: float) -> Flags:
     """(N,) which bodies stand, with a clearance above above_m and up to up_to_m."""
     within = np.empty(len(moving), np.bool_)
     for k in range(len(moving)):

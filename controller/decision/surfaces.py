@@ -14,7 +14,7 @@ from controller.decision.situation import SceneError
 from hal.compiled import compiled, inlined
 from hal.directions import along_and_left
 from hal.records import record
-from hal.types import CameraMount, FloatArray, PlanarPose
+from hal.types import CameraMount, FlagMatrix, Flags, FloatArray, PlanarPose
 from vision.scene import FreeSpace
 
 # x_m and y_m of the camera on the floor, and the cosine and sine of where it looks.
@@ -50,7 +50,7 @@ class Surfaces:
     points_m: FloatArray
     noise: DepthNoise = TYPICAL_DEPTH_NOISE
 
-    def of(self, bodies: Bodies) -> NDArray[np.bool_]:
+    def of(self, bodies: Bodies) -> FlagMatrix:
         """(P, N) which points belong to which bodies. Along the view the tolerance grows with depth noise."""
         return _belongs(bodies, self.points_m, self.forward_m, _DEPTH_SIGMAS * self.noise.quadratic_per_m)
 
@@ -133,9 +133,7 @@ def _impossible(free: FreeSpace) -> tuple[int, int]:
 
 
 @compiled(Bodies, "float64[:, :], float64[:], float64")
-def _belongs(
-    bodies: Bodies, points_m: FloatArray, forward_m: FloatArray, off_per_m: float
-) -> NDArray[np.bool_]:
+def _belongs(bodies: Bodies, points_m: FloatArray, forward_m: FloatArray, off_per_m: float) -> FlagMatrix:
     """(P, N) as Surfaces.of(). off_per_m: growth of the depth noise with the square of forward_m."""
     return covering(bodies, points_m, AROUND_M + off_per_m * forward_m * forward_m, AROUND_M)
 
@@ -196,7 +194,7 @@ def seen_of(
     points_m: FloatArray,
     before_m: float,
     least_m: float,
-    hides: NDArray[np.bool_],
+    hides: Flags,
 ) -> NDArray[np.int64]:
     """(R,) how many points of each of R rows of floor points (2, R, K) count as seen.
 

@@ -12,7 +12,6 @@ import math
 from operator import attrgetter
 
 import numpy as np
-from numpy.typing import NDArray
 
 from controller.decision.bodies import Bodies, extended_towards
 from controller.decision.cut_movers import LEAST_AHEAD_M
@@ -20,7 +19,7 @@ from controller.decision.view_edges import CurrentView, ahead_and_left, reaches_
 from hal.clocks import NS_PER_S
 from hal.compiled import compiled, inlined
 from hal.records import record
-from hal.types import FloatArray, Integers, Matrix, Vector
+from hal.types import Flags, FloatArray, Integers, Matrix, Vector
 
 # Of half its length, as seen from the side. A rectangle turns within the circle through its corners: one of
 # 2.4 x 1.15 m comes nearer by 0.63 of half its length, one of 4.3 x 1.8 m by 0.66.
@@ -134,7 +133,7 @@ def _row_around(known: _Known, xy_m: FloatArray, now_ns: int) -> int:
 
 
 @compiled(Bodies, CurrentView)
-def _cut_by_view(seen: Bodies, view: CurrentView) -> NDArray[np.bool_]:
+def _cut_by_view(seen: Bodies, view: CurrentView) -> Flags:
     """(N,) which tracks may go on beyond a side edge of the view."""
     cut = np.empty(len(seen.ids), np.bool_)
     for k in range(len(cut)):
@@ -144,7 +143,7 @@ def _cut_by_view(seen: Bodies, view: CurrentView) -> NDArray[np.bool_]:
 
 
 @compiled(_Known, Bodies)
-def _lost(known: _Known, seen: Bodies) -> NDArray[np.bool_]:
+def _lost(known: _Known, seen: Bodies) -> Flags:
     """(N,) which of the known are vehicles that may turn, and are not seen."""
     lost = np.zeros(len(known.ids), np.bool_)
     for row in range(len(lost)):
@@ -154,7 +153,7 @@ def _lost(known: _Known, seen: Bodies) -> NDArray[np.bool_]:
 
 @compiled(_Known, Bodies, "boolean[:]")
 def _updated(
-    known: _Known, seen: Bodies, cut: NDArray[np.bool_]
+    known: _Known, seen: Bodies, cut: Flags
 ) -> tuple[Integers, Integers, FloatArray, Integers, FloatArray, FloatArray]:
     """The fields of _Known from set_off_ns on, of the tracks seen; the view cuts some (N,) of them."""
     now_ns, count = seen.captured_ns, len(seen.ids)

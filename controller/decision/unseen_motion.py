@@ -9,15 +9,12 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from controller.decision.bodies import MIN_TRACKED_S, Bodies
 from controller.decision.view_edges import CurrentView, ahead_and_left, is_below_view
 from hal.compiled import compiled, inlined
 from hal.directions import along_and_left
-from hal.types import FloatArray
-
-BoolArray = NDArray[np.bool_]
+from hal.types import FlagMatrix, Flags, FloatArray
 
 # A body that is judged standing counts as approaching if it is faster than both thresholds. Noise makes
 # standing things beside the view seem to creep now and then; lower thresholds would slow the robot each time.
@@ -93,7 +90,7 @@ def _squared_and_variance(velocity_mps: FloatArray, covariance: FloatArray) -> t
 
 
 @compiled(Bodies, CurrentView)
-def stopped_below_view(bodies: Bodies, view: CurrentView) -> BoolArray:
+def stopped_below_view(bodies: Bodies, view: CurrentView) -> Flags:
     """(N,) which movers are below the view, ahead of the camera, and hardly moved when last seen.
 
     A verdict takes some frames: what has stopped still counts as moving when it sinks below the view. Their
@@ -113,7 +110,7 @@ def stopped_below_view(bodies: Bodies, view: CurrentView) -> BoolArray:
     return stopped
 
 
-def hardly_stood(bodies: Bodies) -> BoolArray:
+def hardly_stood(bodies: Bodies) -> Flags:
     """(N,) which bodies were judged standing before a verdict can be trusted, and measured as moving."""
     return _moves_before_verdict(bodies, APPROACH_MIN_SIGMAS, math.inf)
 
@@ -134,7 +131,7 @@ def agrees(bodies: Bodies, k: int, seen: Bodies, m: int) -> bool:
 
 
 @compiled(Bodies, Bodies)
-def velocities_agree(bodies: Bodies, seen: Bodies) -> BoolArray:
+def velocities_agree(bodies: Bodies, seen: Bodies) -> FlagMatrix:
     """(N, M) whether the velocity of each of M seen bodies agrees with that of each of N bodies."""
     agree = np.empty((len(bodies.velocity_mps), len(seen.measured_mps)), np.bool_)
     for k in range(agree.shape[0]):
@@ -144,7 +141,7 @@ def velocities_agree(bodies: Bodies, seen: Bodies) -> BoolArray:
 
 
 @compiled(Bodies, "float64, float64")
-def _moves_before_verdict(bodies: Bodies, sigmas: float, max_mps: float) -> BoolArray:
+def _moves_before_verdict(bodies: Bodies, sigmas: float, max_mps: float) -> Flags:
     """(N,) which bodies are judged standing and tracked for MIN_TRACKED_S to _VERDICT_TRUSTED_S only, but
     were measured as moving.
 

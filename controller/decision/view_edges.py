@@ -12,15 +12,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from controller.decision.bodies import Bodies
 from hal.compiled import compiled, inlined
 from hal.directions import along_and_left
 from hal.records import record
-from hal.types import CameraMount, FloatArray, PlanarPose
-
-BoolArray = NDArray[np.bool_]
+from hal.types import CameraMount, Flags, FloatArray, PlanarPose
 
 # What is farther inside a side edge of the view than this is seen: a distance, and a share of the view's half
 # width, because depth is often missing in the outermost columns.
@@ -131,7 +128,7 @@ def is_below_or_above_view(bodies: Bodies, k: int, near_face_m: float, view: Cur
 
 
 @compiled(Bodies, "float64[:]", CurrentView)
-def below_or_above_view(bodies: Bodies, near_face_m: FloatArray, view: CurrentView) -> BoolArray:
+def below_or_above_view(bodies: Bodies, near_face_m: FloatArray, view: CurrentView) -> Flags:
     """(N,) is_below_or_above_view() of each body; near_face_m (N,)."""
     beyond = np.empty(len(near_face_m), np.bool_)
     for k in range(len(near_face_m)):
@@ -140,7 +137,7 @@ def below_or_above_view(bodies: Bodies, near_face_m: FloatArray, view: CurrentVi
 
 
 @compiled(Bodies, CurrentView)
-def out_of_view(bodies: Bodies, view: CurrentView) -> BoolArray:
+def out_of_view(bodies: Bodies, view: CurrentView) -> Flags:
     """(N,) which bodies are beside, below or above the view, and no farther than _BEHIND_M behind the camera.
 
     A centre up to EDGE_TOLERANCE_M inside the side edge counts as beside the view; of a mover,

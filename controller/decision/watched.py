@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from config.decision import DecisionConfig
 from controller.decision.bodies import Bodies, no_bodies
@@ -25,7 +24,7 @@ from controller.decision.debounce import Debounced
 from controller.decision.limits import UNSEEN_ERROR_SIGMAS
 from controller.decision.world_model import WorldModel
 from hal.records import record
-from hal.types import FloatArray
+from hal.types import Flags, FloatArray
 
 # A body must head for the corridor for this long until it counts as coming in, and head elsewhere for as long
 # until it does not. Meanwhile the worst case covers it.
@@ -50,8 +49,8 @@ class Watched:
     since_s: float
     placed: Placed
     velocities: PathVelocities
-    enters: NDArray[np.bool_]
-    could_enter: NDArray[np.bool_]
+    enters: Flags
+    could_enter: Flags
 
 
 class Watch:
@@ -101,7 +100,7 @@ class Watch:
 
     def _may_come_unseen(
         self, placed: Placed, velocities: PathVelocities, sigma_left_mps: FloatArray
-    ) -> NDArray[np.bool_]:
+    ) -> Flags:
         """(N,) which bodies out of view approach the path and may come into it.
 
         They may be nearer to it than where they are placed, and faster than when they were last seen: whoever

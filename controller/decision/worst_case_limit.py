@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from config.decision import DecisionConfig
 from config.robot import Limits
@@ -36,7 +35,7 @@ from controller.decision.reachability import (
 )
 from controller.decision.watched import Watched
 from controller.profile import SpeedRamps, ramps_from
-from hal.types import FloatArray
+from hal.types import Flags, FloatArray
 
 # Times that are looked at: every 0.1 s up to 2 s, where stops from low speeds end, then every 0.2 s.
 _STEP_S, _FINE_S, _COARSE_STEP_S = 0.1, 2.0, 0.2
@@ -113,14 +112,12 @@ class WorstCase:
         )
         return Limit(speed, lambda: _reason(gap, speed), urgent)
 
-    def _too_late(self, motion: Motion, s_m: float, reached: Reach, counts: NDArray[np.bool_]) -> bool:
+    def _too_late(self, motion: Motion, s_m: float, reached: Reach, counts: Flags) -> bool:
         """Whether even an emergency stop that begins now would touch a body in the mask counts (N,)."""
         now = self._stops(np.array([motion.v_mps]), motion.a_mps2, motion.latency_s)
         return count_safe_stops(now, s_m, reached, counts) == 0
 
-    def _speed(
-        self, reached: Reach, young: NDArray[np.bool_], enters: NDArray[np.bool_], s_m: float
-    ) -> float:
+    def _speed(self, reached: Reach, young: Flags, enters: Flags, s_m: float) -> float:
         """The greatest safe speed; inf: no need to slow.
 
         For confirmed bodies the stop begins _FORESIGHT_S later. For young bodies it begins confirm_s later:
@@ -135,7 +132,7 @@ class WorstCase:
             return speed
         return max(speed, min(self._greatest(self._stops_early, reached, enters, s_m), beside_mps))
 
-    def _greatest(self, stopping: Stops, reached: Reach, counts: NDArray[np.bool_], s_m: float) -> float:
+    def _greatest(self, stopping: Stops, reached: Reach, counts: Flags, s_m: float) -> float:
         """The greatest speed whose stop stays short of all bodies in the mask counts (N,).
 
         inf: every stop does; 0: none does.
@@ -155,7 +152,7 @@ class WorstCase:
         waits = self._stops_early, self._stops_after_confirming
         self._furthest_m = float(max(stop.distance_m.max() for stop in waits))
 
-    def _reach(self, watched: Watched, counts: NDArray[np.bool_]) -> Reach:
+    def _reach(self, watched: Watched, counts: Flags) -> Reach:
         manoeuvres = manoeuvres_of(watched, self._config.prediction)
         margin_m = self._config.margins.least_m
         max_mps = self._limits.max_obstacle_speed_mps
