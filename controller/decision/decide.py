@@ -67,7 +67,7 @@ class DecisionMaker:
         self._now_ns: int | None = None
         self._emergency = False
         self._stuck_since_ns: int | None = None
-        self._last: Reason | None = None
+        self._last_limiting: Reason | None = None
 
     def continue_along(self, path: Path, known: WorldModel) -> None:
         """Continue along another path, of which known is known already; the hysteresis is kept."""
@@ -118,7 +118,7 @@ class DecisionMaker:
         self._gate.step(0.0, v, 0.0, now_ns)
         self._stuck_since_ns = None
         reason = Reason("fault", f"{fault}: stop")
-        self._last = reason
+        self._last_limiting = reason
         action = Action.DECREASE if abs(v) > STANDING_MPS else Action.KEEP
         return Decision(action, 0.0, reason, self._emergency)
 
@@ -131,27 +131,29 @@ class DecisionMaker:
 
     def _conclude(self, on_way: Limit, limits: list[Limit], motion: Motion, now_ns: int) -> Decision:
         least = _least(limits)
-        raw_mps = self._start_or_creep(least, motion)
-        gated_mps = self._gated_mps(raw_mps, least, on_way, motion, now_ns)
+        allowed_mps = self._start_or_creep(least, motion)
+        gated_mps = self._gated_mps(allowed_mps, least, on_way, motion, now_ns)
         target_mps = min(gated_mps, on_way.speed_mps)
-        reason = self._reason(raw_mps, gated_mps, least, on_way, motion)
-        self._emergency = self._brakes_hard(limits, min(raw_mps, on_way.speed_mps), motion)
+        reason = self._reason(allowed_mps, gated_mps, least, on_way, motion)
+        self._emergency = self._brakes_hard(limits, min(allowed_mps, on_way.speed_mps), motion)
         self._note_stuck(target_mps, motion, reason, now_ns)
         action = self._action(target_mps, motion.v_mps)
-        closing = motion.a_mps2 < 0.0 or reason.distance_m <= _AT_END_M
-        if action is Action.INCREASE and reason.rule == "target" and closing:
-            # The shaper is braking for the target: a speed that is higher only by the slack is no increase.
+        brakes_for_target = motion.a_mps2 < 0.0 or reason.distance_m <= _AT_END_M
+        if action is Action.INCREASE and reason.rule == "target" and brakes_for_target:
+            # A speed that is higher only by the slack of the target's limit is no increase.
             action = Action.KEEP
         return Decision(action, target_mps, reason, self._emergency, self._stuck_since_ns)
 
-    def _gated_mps(self, raw_mps: float, least: Limit, on_way: Limit, motion: Motion, now_ns: int) -> float:
-        """What start delay and release gate pass on of raw_mps, the speed that least allows now."""
-        blocked = raw_mps <= 0.0
+    def _gated_mps(
+        self, allowed_mps: float, least: Limit, on_way: Limit, motion: Motion, now_ns: int
+    ) -> float:
+        """What start delay and release gate pass on of allowed_mps, the speed that least allows now."""
+        blocked = allowed_mps <= 0.0
         waits = self._start_delay.step(blocked, blocked and least.reason.rule in STANDING_RULES, now_ns)
         let_go_mps = max(motion.v_mps - motion.a_mps2**2 / (2.0 * self._comfort.jerk_mps3), 0.0)
         # Something that comes and goes does not stop a robot that still rolls, but lets it get no faster.
         rolling_mps = let_go_mps if let_go_mps >= self._config.release.creep_mps else 0.0
-        released_mps = min(raw_mps, rolling_mps if waits else self._robot.limits.max_speed_mps)
+        released_mps = min(allowed_mps, rolling_mps if waits else self._robot.limits.max_speed_mps)
         return self._gate.step(released_mps, motion.v_mps, let_go_mps, now_ns, on_way.speed_mps)
 
     def _start_or_creep(self, limit: Limit, motion: Motion) -> float:
@@ -173,35 +175,21 @@ class DecisionMaker:
         return limit.speed_mps if limit.speed_mps >= least else 0.0
 
     def _reason(
-        self, raw_mps: float, gated_mps: float, least: Limit, on_way: Limit, motion: Motion
+        self, allowed_mps: float, gated_mps: float, least: Limit, on_way: Limit, motion: Motion
     ) -> Reason:
         """The reason for the target, which is gated_mps or what the path allows.
 
-        While the release gate holds the target back, the reason is the last thing that limited it. That is
-        noted here.
+        Notes what limits the speed: while the release gate holds the target back, that is told.
         """
         limiting: Reason | None = None
-        if raw_mps < min(self._robot.limits.max_speed_mps, on_way.speed_mps):
-            self._last = limiting = _reason_for(least, raw_mps)
+        if allowed_mps < min(self._robot.limits.max_speed_mps, on_way.speed_mps):
+            self._last_limiting = limiting = _reason_for(least, allowed_mps)
         if on_way.speed_mps <= gated_mps:
             return on_way.reason
-        limiting = limiting or _reason_for(least, raw_mps)
-        if gated_mps >= raw_mps or self._last is None:
+        limiting = limiting or _reason_for(least, allowed_mps)
+        if gated_mps >= allowed_mps or self._last_limiting is None:
             return limiting
-        held = self._last
-        if gated_mps > 0.0:
-            waits = f"not faster than {gated_mps:.2f} m/s yet"
-        else:
-            waits = "not starting yet" if motion.v_mps <= STANDING_MPS else "still stopping"
-        return Reason(
-            "release",
-            f"{waits}; last limit: {held.sentence}",
-            held.obstacle_id,
-            limiting.distance_m,
-            limiting.closing_mps,
-            limiting.required_m,
-            limiting.margin_m,
-        )
+        return _reason_to_wait(self._last_limiting, limiting, gated_mps, motion)
 
     def _brakes_hard(self, limits: list[Limit], allowed_mps: float, motion: Motion) -> bool:
         """Whether to brake harder than comfort: from an urgent limit on until the speed is allowed again.
@@ -238,6 +226,23 @@ def _unknown(on_floor: float, along: float) -> str:
     if not math.isfinite(along):
         return "the robot's position on its path is not known"
     return "the robot's speed is not known"
+
+
+def _reason_to_wait(last: Reason, now: Reason, gated_mps: float, motion: Motion) -> Reason:
+    """The reason while the release gate holds the target back: what last limited the speed.
+
+    Distances are those of the least limit now.
+    """
+    if gated_mps > 0.0:
+        waits = f"not faster than {gated_mps:.2f} m/s yet"
+    else:
+        waits = "not starting yet" if motion.v_mps <= STANDING_MPS else "still stopping"
+    return replace(
+        now,
+        rule="release",
+        sentence=f"{waits}; last limit: {last.sentence}",
+        obstacle_id=last.obstacle_id,
+    )
 
 
 def _reason_for(limit: Limit, speed_mps: float) -> Reason:

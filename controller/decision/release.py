@@ -91,24 +91,25 @@ class ReleaseGate:
         self._delayed_min, self._recent_min = _RunningMin(config.delay_s), _RunningMin(config.far_delay_s)
 
     def step(
-        self, raw_mps: float, v_mps: float, let_go_mps: float, now_ns: int, max_mps: float = math.inf
+        self, allowed_mps: float, v_mps: float, let_go_mps: float, now_ns: int, max_mps: float = math.inf
     ) -> float:
         """The target speed to use.
 
-        raw_mps: the least of the limits now.
+        allowed_mps: what the limits allow now.
         v_mps: the present speed.
         let_go_mps: the speed that is reached if the present deceleration ends now. Keeping that speed is no
         increase, so it is allowed at any time.
         max_mps: what the path allows; it bounds the gain, and is not delayed here.
         """
         band = self._config.dead_band_mps
-        min_mps, far_mps = self._delayed_min.update(raw_mps, now_ns), self._recent_min.update(raw_mps, now_ns)
+        min_mps = self._delayed_min.update(allowed_mps, now_ns)
+        far_mps = self._recent_min.update(allowed_mps, now_ns)
         if v_mps > STANDING_MPS and far_mps >= v_mps + self._config.far_mps:
             min_mps = far_mps
-        if raw_mps < self._held_mps - band or raw_mps <= 0.0:
+        if allowed_mps < self._held_mps - band or allowed_mps <= 0.0:
             self._rising = False
-        if raw_mps <= self._held_mps or self._rising:
-            self._held_mps = raw_mps
+        if allowed_mps <= self._held_mps or self._rising:
+            self._held_mps = allowed_mps
         elif min_mps > self._held_mps:
             self._raise(min_mps, let_go_mps, now_ns)
         target_mps = self._held_mps
