@@ -21,6 +21,7 @@ The files in the order of one control step, each below the one that asks it:
         * unseen_position.py - where the movers among them are expected
         * seen_through.py - whether the place of a body that went missing is seen, and seen empty
       * cut_movers.py - how much nearer those may extend that come in over the edge of the view
+      * nearer_boxes.py - boxes that may be nearer than they are seen
       * lately_moved.py - which bodies only pause: they moved a moment ago
     * lens_cover.py - whether something covers the lens
     * sight.py - what depth sees of the corridor, and which surfaces in it no body explains

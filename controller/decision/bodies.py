@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from operator import attrgetter
 
 import numpy as np
@@ -127,13 +126,6 @@ _NO_ARRAYS = _arrays_of(_NOBODY)
 def no_bodies(captured_ns: int) -> Bodies:
     """The bodies of an empty scene."""
     return Bodies(captured_ns, *_NO_ARRAYS)
-
-
-def extended_towards(bodies: Bodies, by_m: FloatArray, heading_rad: float) -> Bodies:
-    """The bodies, each by_m (N,) nearer to a robot behind them that heads for heading_rad."""
-    backwards = np.array([-math.cos(heading_rad), -math.sin(heading_rad)])
-    xy_m = bodies.xy_m + 0.5 * by_m[:, None] * backwards
-    return replace(bodies, xy_m=xy_m, half_view_m=bodies.half_view_m + 0.5 * by_m)
 
 
 @inlined

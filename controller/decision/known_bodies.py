@@ -8,7 +8,7 @@ controller/decision/world_model.py takes the obstacles of each new scene in here
 4. velocity_filter.py: their velocities, averaged.
 5. leaving_movers.py: which of them set off as they leave the view.
 6. out_of_view.py: which others have left the view and still count.
-7. cut_movers.py, turning_vehicles.py: how much nearer than they are seen some of them may be.
+7. cut_movers.py, nearer_boxes.py: how much nearer than they are seen some of them may be.
 8. lately_moved.py: which of them only pause.
 """
 
@@ -19,13 +19,14 @@ import numpy as np
 from config.decision import DecisionConfig
 from config.robot import Robot
 from controller.decision.bodies import Bodies, no_bodies
-from controller.decision.cut_movers import with_hidden_near_sides
+from controller.decision.cut_movers import hidden_m
 from controller.decision.known_places import KnownPlaces
 from controller.decision.lately_moved import LatelyMoved
 from controller.decision.leaving_movers import LeavingMovers
+from controller.decision.nearer_boxes import extended_nearer
 from controller.decision.out_of_view import OutOfView
 from controller.decision.surfaces import Surfaces
-from controller.decision.turning_vehicles import TurningVehicles, with_swinging_ends
+from controller.decision.turning_vehicles import TurningVehicles
 from controller.decision.velocity_filter import SteadyVelocities
 from controller.decision.view_edges import CurrentView
 from hal.compiled import compiled
@@ -86,8 +87,8 @@ class KnownBodies:
         boxes = self._velocity_filter.update(boxes)
         boxes = self._leaving_movers.marked(boxes, view)
         remembered = self._out_of_view.update(self.in_view, boxes, view, standing, free)
-        extended = with_hidden_near_sides(boxes, view, self._front_m)
-        extended = with_swinging_ends(extended, swing_m[boxed], view, self._front_m)
+        extended = extended_nearer(boxes, hidden_m(boxes, view), view, self._front_m)
+        extended = extended_nearer(extended, swing_m[boxed], view, self._front_m)
         self.bodies, self.in_view = extended.joined(remembered), boxes
         self._seen, self._boxed, self._unboxed = seen, boxed, None
         self._lately_moved.look(boxes)

@@ -3,7 +3,7 @@
 The camera gives a thing that it loses for a moment a new number. KnownPlaces remembers where things have just
 stood, so that such a track is not taken for somebody who has only now appeared.
 
-controller/decision/world_model.py asks it about each new scene.
+controller/decision/known_bodies.py asks it about each new scene.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 Somebody crosses, stops beside the way to look at something, and turns back. Perception judges him standing
 after some tenths of a second. Then he would be passed like a crate that leaves enough room.
-controller/decision/world_model.py asks once a scene.
+controller/decision/known_bodies.py asks once a scene.
 """
 
 from __future__ import annotations

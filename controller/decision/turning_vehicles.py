@@ -3,7 +3,7 @@
 A car that has backed out across the way, or a fork lift, turns where it is. Its middle does not move, so
 nothing tells the turn beforehand, and the end that was beside the robot's way comes nearer by more than the
 robot keeps free. While it turns, perception may lose it, and see it again as other tracks: what begins where
-it was is taken for a part of it. controller/decision/world_model.py asks once a scene.
+it was is taken for a part of it. controller/decision/known_bodies.py asks once a scene.
 """
 
 from __future__ import annotations
@@ -13,8 +13,7 @@ from operator import attrgetter
 
 import numpy as np
 
-from controller.decision.bodies import Bodies, extended_towards
-from controller.decision.cut_movers import LEAST_AHEAD_M
+from controller.decision.bodies import Bodies
 from controller.decision.view_edges import CurrentView, ahead_and_left, reaches_side_edge
 from hal.clocks import NS_PER_S
 from hal.compiled import compiled, inlined
@@ -40,7 +39,7 @@ _NEVER_NS = -(2**62)
 
 
 @record(frozen=True, slots=True, eq=False)
-class _Known:
+class _Tracks:
     """What is known of N tracks, (N,) each: those of the last scene, then vehicles that have been lost since.
 
     xy_m: (N, 2) where it was last seen.
@@ -60,15 +59,15 @@ class _Known:
     whole_half_m: Vector
     half_m: Vector
 
-    def followed_by(self, other: _Known, rows: Integers) -> _Known:
+    def followed_by(self, other: _Tracks, rows: Integers) -> _Tracks:
         """These tracks, followed by the rows of others."""
         if not len(rows):
             return self
         pairs = zip(_arrays_of(self), _arrays_of(other), strict=True)
-        return _Known(*(np.concatenate((mine, its[rows])) for mine, its in pairs))
+        return _Tracks(*(np.concatenate((mine, its[rows])) for mine, its in pairs))
 
 
-_arrays_of = attrgetter(*_Known.__slots__)
+_arrays_of = attrgetter(*_Tracks.__slots__)
 
 
 class TurningVehicles:
@@ -81,7 +80,7 @@ class TurningVehicles:
         self._swing_allowed_m = swing_allowed_m
         nobody = np.zeros(0, np.int64)
         size_m = np.zeros(0)
-        self._known = _Known(nobody, np.zeros((0, 2)), nobody, nobody, size_m, nobody, size_m, size_m)
+        self._tracks = _Tracks(nobody, np.zeros((0, 2)), nobody, nobody, size_m, nobody, size_m, size_m)
 
     def swing_m(self, seen: Bodies, view: CurrentView) -> FloatArray:
         """(N,) by how much more than the margin allows the ends of the tracks of a scene may come nearer.
@@ -89,22 +88,10 @@ class TurningVehicles:
         0 for whatever is no vehicle that has moved lately and is slow now.
         """
         cut = _cut_by_view(seen, view)
-        known = _Known(seen.ids, seen.xy_m, *_updated(self._known, seen, cut))
-        swing_m = _swings(known, seen, self._swing_allowed_m)
-        self._known = known.followed_by(self._known, _lost(self._known, seen).nonzero()[0])
+        tracks = _Tracks(seen.ids, seen.xy_m, *_updated(self._tracks, seen, cut))
+        swing_m = _swings(tracks, seen, self._swing_allowed_m)
+        self._tracks = tracks.followed_by(self._tracks, _lost(self._tracks, seen).nonzero()[0])
         return swing_m
-
-
-def with_swinging_ends(boxes: Bodies, swing_m: FloatArray, view: CurrentView, front_m: float) -> Bodies:
-    """The boxes (N) extended towards the robot by swing_m (N,), but not up to its front.
-
-    front_m: from the robot's turning centre to its foremost point.
-    """
-    if not np.count_nonzero(swing_m):
-        return boxes
-    ahead_m = (boxes.xy_m - (view.x_m, view.y_m)) @ (math.cos(view.heading_rad), math.sin(view.heading_rad))
-    room_m = ahead_m - boxes.half_view_m - front_m - LEAST_AHEAD_M
-    return extended_towards(boxes, np.minimum(swing_m, np.maximum(room_m, 0.0)), view.heading_rad)
 
 
 @inlined
@@ -116,18 +103,18 @@ def _row_of(ids: Integers, one: int) -> int:
 
 
 @inlined
-def _may_turn(known: _Known, row: int, now_ns: int) -> bool:
+def _may_turn(tracks: _Tracks, row: int, now_ns: int) -> bool:
     """Whether it is a vehicle that has moved lately."""
-    result: bool = known.half_m[row] > _LEAST_HALF_M and now_ns - known.moved_ns[row] <= _MOVED_NS
+    result: bool = tracks.half_m[row] > _LEAST_HALF_M and now_ns - tracks.moved_ns[row] <= _MOVED_NS
     return result
 
 
 @inlined
-def _row_around(known: _Known, xy_m: FloatArray, now_ns: int) -> int:
+def _row_around(tracks: _Tracks, xy_m: FloatArray, now_ns: int) -> int:
     """The row of a vehicle that may turn and within half a length of which xy_m lies; -1: there is none."""
-    for row in range(len(known.ids)):
-        away_m = math.hypot(known.xy_m[row, 0] - xy_m[0], known.xy_m[row, 1] - xy_m[1])
-        if away_m <= known.half_m[row] and _may_turn(known, row, now_ns):
+    for row in range(len(tracks.ids)):
+        away_m = math.hypot(tracks.xy_m[row, 0] - xy_m[0], tracks.xy_m[row, 1] - xy_m[1])
+        if away_m <= tracks.half_m[row] and _may_turn(tracks, row, now_ns):
             return row
     return -1
 
@@ -142,40 +129,40 @@ def _cut_by_view(seen: Bodies, view: CurrentView) -> Flags:
     return cut
 
 
-@compiled(_Known, Bodies)
-def _lost(known: _Known, seen: Bodies) -> Flags:
-    """(N,) which of the known are vehicles that may turn, and are not seen."""
-    lost = np.zeros(len(known.ids), np.bool_)
+@compiled(_Tracks, Bodies)
+def _lost(tracks: _Tracks, seen: Bodies) -> Flags:
+    """(N,) which of the tracks are vehicles that may turn, and are not seen."""
+    lost = np.zeros(len(tracks.ids), np.bool_)
     for row in range(len(lost)):
-        lost[row] = _may_turn(known, row, seen.captured_ns) and _row_of(seen.ids, known.ids[row]) < 0
+        lost[row] = _may_turn(tracks, row, seen.captured_ns) and _row_of(seen.ids, tracks.ids[row]) < 0
     return lost
 
 
-@compiled(_Known, Bodies, "boolean[:]")
+@compiled(_Tracks, Bodies, "boolean[:]")
 def _updated(
-    known: _Known, seen: Bodies, cut: Flags
+    tracks: _Tracks, seen: Bodies, cut: Flags
 ) -> tuple[Integers, Integers, FloatArray, Integers, FloatArray, FloatArray]:
-    """The fields of _Known from set_off_ns on, of the tracks seen; the view cuts some (N,) of them."""
+    """The fields of _Tracks from set_off_ns on, of the tracks seen; the view cuts some (N,) of them."""
     now_ns, count = seen.captured_ns, len(seen.ids)
     set_off_ns, moved_ns = np.full(count, now_ns, np.int64), np.full(count, _NEVER_NS, np.int64)
     seen_half_m, wide_ns = seen.half_across_m.copy(), np.full(count, now_ns, np.int64)
     whole_half_m, half_m = np.zeros(count), np.empty(count)
     for k in range(count):
         guess_m = 0.0
-        before = _row_of(known.ids, seen.ids[k])
+        before = _row_of(tracks.ids, seen.ids[k])
         if before < 0:
-            before = _row_around(known, seen.xy_m[k], now_ns)
+            before = _row_around(tracks, seen.xy_m[k], now_ns)
         if before >= 0:
-            moved_ns[k] = known.moved_ns[before]
+            moved_ns[k] = tracks.moved_ns[before]
             if seen.moving[k]:
-                set_off_ns[k] = known.set_off_ns[before]
+                set_off_ns[k] = tracks.set_off_ns[before]
             if (
-                seen_half_m[k] < known.seen_half_m[before]
-                and now_ns - known.wide_ns[before] <= _WIDTH_KEPT_NS
+                seen_half_m[k] < tracks.seen_half_m[before]
+                and now_ns - tracks.wide_ns[before] <= _WIDTH_KEPT_NS
             ):
-                seen_half_m[k], wide_ns[k] = known.seen_half_m[before], known.wide_ns[before]
-            whole_half_m[k] = known.whole_half_m[before]
-            guess_m = known.half_m[before] if known.half_m[before] > known.seen_half_m[before] else 0.0
+                seen_half_m[k], wide_ns[k] = tracks.seen_half_m[before], tracks.wide_ns[before]
+            whole_half_m[k] = tracks.whole_half_m[before]
+            guess_m = tracks.half_m[before] if tracks.half_m[before] > tracks.seen_half_m[before] else 0.0
         if now_ns - set_off_ns[k] >= _FOR_SURE_NS:
             moved_ns[k] = now_ns
         if not cut[k]:
@@ -186,12 +173,12 @@ def _updated(
     return set_off_ns, moved_ns, seen_half_m, wide_ns, whole_half_m, half_m
 
 
-@compiled(_Known, Bodies, "float64")
-def _swings(known: _Known, seen: Bodies, allowed_m: float) -> FloatArray:
+@compiled(_Tracks, Bodies, "float64")
+def _swings(tracks: _Tracks, seen: Bodies, allowed_m: float) -> FloatArray:
     """As TurningVehicles.swing_m."""
     swing_m = np.zeros(len(seen.ids))
     for k in range(len(swing_m)):
         slow = math.hypot(seen.measured_mps[k, 0], seen.measured_mps[k, 1]) < _SLOW_MPS
-        if slow and _may_turn(known, k, seen.captured_ns):
-            swing_m[k] = max(_SWING_SHARE * known.half_m[k] - allowed_m, 0.0)
+        if slow and _may_turn(tracks, k, seen.captured_ns):
+            swing_m[k] = max(_SWING_SHARE * tracks.half_m[k] - allowed_m, 0.0)
     return swing_m

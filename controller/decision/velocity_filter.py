@@ -3,7 +3,7 @@
 The newest velocity of something far away is mostly noise, and a prediction made from it would change with
 every frame. So a Kalman filter for each axis follows good measurements at once and averages poor ones. By how
 much the newest measurement differs beyond noise, and may go on to differ, is kept as innovation_mps for the
-worst case. controller/decision/world_model.py calls it once a scene.
+worst case. controller/decision/known_bodies.py calls it once a scene.
 """
 
 from __future__ import annotations

@@ -7,7 +7,8 @@ import math
 import pytest
 
 from controller.decision.bodies import Bodies
-from controller.decision.cut_movers import with_hidden_near_sides
+from controller.decision.cut_movers import hidden_m
+from controller.decision.nearer_boxes import extended_nearer
 from controller.decision.view_edges import view_from
 from hal.types import CameraMount, PlanarPose
 from tests.support.floor_bodies import box
@@ -17,8 +18,12 @@ VIEW = view_from(PlanarPose(0.0, 0.0, 0.0), MOUNT, edge_tan=0.7, near_m=1.3, up_
 FRONT_M = 0.6
 
 
+def extended(body: Bodies) -> Bodies:
+    return extended_nearer(body, hidden_m(body, VIEW), VIEW, FRONT_M)
+
+
 def near_side_m(body: Bodies) -> float:
-    seen = with_hidden_near_sides(body, VIEW, FRONT_M)
+    seen = extended(body)
     return float(seen.xy_m[0, 0] - seen.half_view_m[0])
 
 
@@ -27,7 +32,7 @@ def test_a_truck_whose_far_corner_is_seen_may_begin_a_metre_nearer(side: float) 
     """The near corner of what is seen, 5 m ahead of the camera and 3.5 m aside, is on the view's edge."""
     truck = box(6.0, side * 4.0, 0.0, -side * 1.4, half_view_m=0.5, half_across_m=0.5)
     assert near_side_m(truck) == pytest.approx(4.5)
-    far_side = with_hidden_near_sides(truck, VIEW, FRONT_M)
+    far_side = extended(truck)
     assert float(far_side.xy_m[0, 0] + far_side.half_view_m[0]) == pytest.approx(6.5)
 
 

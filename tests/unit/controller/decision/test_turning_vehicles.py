@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from controller.decision.bodies import Bodies, no_bodies
-from controller.decision.turning_vehicles import TurningVehicles, with_swinging_ends
+from controller.decision.nearer_boxes import extended_nearer
+from controller.decision.turning_vehicles import TurningVehicles
 from controller.decision.view_edges import view_from
 from hal.clocks import NS_PER_S
 from hal.types import PlanarPose
@@ -161,16 +162,16 @@ def test_a_track_that_begins_elsewhere_is_another_thing() -> None:
 
 
 def test_its_box_is_extended_towards_the_robot() -> None:
-    near = with_swinging_ends(seen(0.0), np.array([SWING_M]), VIEW, FRONT_M)
+    near = extended_nearer(seen(0.0), np.array([SWING_M]), VIEW, FRONT_M)
     assert float(near.xy_m[0, 0] - near.half_view_m[0]) == pytest.approx(3.5 - SWING_M)
     assert float(near.xy_m[0, 0] + near.half_view_m[0]) == pytest.approx(4.5)
 
 
 def test_it_is_not_extended_to_what_the_front_has_passed() -> None:
     """The conflict with a body that begins behind the robot's front is dropped: its front is past it."""
-    near = with_swinging_ends(seen(0.0), np.array([SWING_M]), replace(VIEW, x_m=2.5), FRONT_M)
+    near = extended_nearer(seen(0.0), np.array([SWING_M]), replace(VIEW, x_m=2.5), FRONT_M)
     assert float(near.xy_m[0, 0] - near.half_view_m[0]) == pytest.approx(2.5 + FRONT_M + 0.3)
-    beside = with_swinging_ends(seen(0.0), np.array([SWING_M]), replace(VIEW, x_m=3.0), FRONT_M)
+    beside = extended_nearer(seen(0.0), np.array([SWING_M]), replace(VIEW, x_m=3.0), FRONT_M)
     assert float(beside.xy_m[0, 0] - beside.half_view_m[0]) == 3.5
 
 
@@ -186,6 +187,6 @@ def test_only_vehicles_that_may_turn_are_remembered_out_of_sight() -> None:
     for scene in (person, seen(1.0, 1.0), seen(2.0, 1.0)):
         swing_m(vehicles, scene)
     swing_m(vehicles, no_bodies(round(2.1 * NS_PER_S)))
-    assert vehicles._known.ids.tolist() == [1]
+    assert vehicles._tracks.ids.tolist() == [1]
     swing_m(vehicles, no_bodies(round(7.1 * NS_PER_S)))
-    assert vehicles._known.ids.tolist() == []
+    assert vehicles._tracks.ids.tolist() == []
