@@ -86,12 +86,13 @@ class Watch:
         velocities = path_velocities(bodies, placed.heading_rad[:, 0])
         sigma_left_mps = velocities.sigma_left_mps * self._config.prediction.sigmas
         comes = likely_enters(placed, self._times_s, sigma_left_mps)
-        # No debounce for a body that is in the corridor now, nor for one out of view: without measurements
-        # there is no noise.
+        # A body that is in the corridor now comes in at once. One out of view, which no noise of measurements
+        # makes turn away, no longer does at once.
         at_once = np.where(comes, placed.clearance_m[:, 0] <= 0.0, self._remembered)
         # A pause is no sign of going elsewhere: whoever goes on afterwards comes in as before.
         heads_in = np.where(self._pausing, self._enters.flags(bodies.ids), comes)
         heads_in = self._enters.update(bodies.ids, heads_in, at_once, now_s)
+        # While it pauses, it enters only if it stands in the corridor.
         enters = np.where(self._pausing, comes, heads_in)
         could_enter = enters | comes
         if np.count_nonzero(self._remembered):
