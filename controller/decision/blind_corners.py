@@ -9,6 +9,7 @@ controller/decision/sight.py calls BlindCorners once a scene.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from operator import attrgetter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,9 +61,13 @@ class SurfacesOnPath:
 
 
 @dataclass(slots=True)
-class _Corner:
-    """A corner that was noted: its place and side, its distance from the swept width, and how well it is
-    confirmed (_MIN_SCORE)."""
+class BlindCorner:
+    """A corner that was noted; an opening begins there.
+
+    s_m, beside_m: along the path, and beside the swept width.
+    left: on which side.
+    score: how well it is confirmed (_MIN_SCORE).
+    """
 
     s_m: float
     left: bool
@@ -70,20 +75,12 @@ class _Corner:
     score: int
 
 
-@record(frozen=True, slots=True)
-class BlindCorner:
-    """A corner at s_m along the path, beside_m beside the swept width; an opening begins there."""
-
-    s_m: float
-    beside_m: float
-
-
 class BlindCorners:
     """Remembers the corners along one path; call look() once a scene."""
 
     def __init__(self, config: SightConfig) -> None:
         self._beside_m = config.blind_corner_m
-        self._corners: list[_Corner] = []
+        self._corners: list[BlindCorner] = []
 
     def look(
         self,
@@ -113,10 +110,7 @@ class BlindCorners:
         """The next one whose opening the robot's front is not past; None: there is none."""
         past_m = front_s_m - _OPENING_M
         ahead = [one for one in self._corners if one.s_m > past_m and one.score >= _MIN_SCORE]
-        if not ahead:
-            return None
-        first = min(ahead, key=lambda one: one.s_m)
-        return BlindCorner(first.s_m, first.beside_m)
+        return min(ahead, key=attrgetter("s_m"), default=None)
 
     def _note(self, s_m: float, left: bool, beside_m: float) -> None:
         for corner in self._corners:
@@ -125,7 +119,7 @@ class BlindCorners:
                 corner.s_m += 0.3 * (s_m - corner.s_m)
                 corner.beside_m += 0.3 * (beside_m - corner.beside_m)
                 return
-        self._corners.append(_Corner(s_m, left, beside_m, 1))
+        self._corners.append(BlindCorner(s_m, left, beside_m, 1))
 
 
 @inlined
@@ -164,8 +158,8 @@ def _ends_blind(points: SurfacesOnPath, first: int, last: int, inward: int, band
     return _passage_behind(points, last, last + inward, band_tan)
 
 
-@compiled(SurfacesOnPath, "boolean[:]", _Corner)
-def _closed(points: SurfacesOnPath, hides: Flags, corner: _Corner) -> bool:
+@compiled(SurfacesOnPath, "boolean[:]", BlindCorner)
+def _closed(points: SurfacesOnPath, hides: Flags, corner: BlindCorner) -> bool:
     """Whether no passage can begin at the corner: what stands there leaves no gap as wide.
 
     A post or a box in front of a rack's goods hides a strip of them from afar, and the strip grows narrower
