@@ -27,7 +27,7 @@ from controller.decision.nearer_boxes import extended_nearer
 from controller.decision.out_of_view import OutOfView
 from controller.decision.surfaces import Surfaces
 from controller.decision.turning_vehicles import TurningVehicles
-from controller.decision.velocity_filter import SteadyVelocities
+from controller.decision.velocity_filter import VelocityFilter
 from controller.decision.view_edges import CurrentView
 from hal.compiled import compiled
 from hal.types import Flags, FloatArray
@@ -57,7 +57,7 @@ class KnownBodies:
         self._front_m = robot.body.front_m
         self._turning = TurningVehicles(config.margins.stop_m - config.margins.least_m)
         self._known_places = KnownPlaces()
-        self._velocity_filter = SteadyVelocities()
+        self._velocity_filter = VelocityFilter()
         self._leaving_movers = LeavingMovers()
         self._out_of_view = OutOfView(robot.limits.max_obstacle_speed_mps)
         self._lately_moved = LatelyMoved()

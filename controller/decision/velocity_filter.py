@@ -38,7 +38,7 @@ _STOOD_S = 0.3
 _LEAST_MPS = 1e-3  # lower bound of a divisor
 
 
-class SteadyVelocities:
+class VelocityFilter:
     """The filters' state by body id; call update once a scene."""
 
     def __init__(self) -> None:
