@@ -15,8 +15,7 @@ from controller.base.driven_base import DriveLoop, DrivenBase
 from controller.base.localise import Localiser
 from controller.base.response_monitor import ResponseMonitor, SpeedCap
 from controller.decision.decision import Decision
-from controller.decision.limits import speed_to_decide_by
-from controller.decision.situation import Situation
+from controller.decision.situation import Situation, speed_to_decide_by
 from controller.follow import PathFollower
 from controller.path.path import OnPath, Path
 from controller.shape import SpeedShaper

@@ -18,7 +18,6 @@ from controller import braking
 from controller.decision.camera_limits import CameraLimits
 from controller.decision.decision import Action, Decision, Reason
 from controller.decision.limits import (
-    BACKWARDS_MPS,
     BLOCKING_RULES,
     LEAST_TOLD_MPS,
     STANDING_MPS,
@@ -29,7 +28,7 @@ from controller.decision.limits import (
 )
 from controller.decision.path_limit import path_limit
 from controller.decision.release import ReleaseGate, StartDelay
-from controller.decision.situation import Situation
+from controller.decision.situation import BACKWARDS_MPS, Situation
 from controller.decision.speed_limits import SpeedLimits
 from controller.decision.world_model import WorldModel
 from controller.path.path import OnPath, Path

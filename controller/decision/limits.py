@@ -18,7 +18,6 @@ from hal.records import record
 # An obstacle still counts as ahead while the robot's front is past its near side by no more than this.
 ALONGSIDE_M = 0.1
 STANDING_MPS = 0.01  # the decision counts a slower robot as standing, by command and by measurement
-BACKWARDS_MPS = -0.05  # a smaller backward speed is noise of the odometry
 # Nothing corrects the expected place of a body out of view: while it is not seen, an error of this many
 # standard deviations of its velocity may add up.
 UNSEEN_ERROR_SIGMAS = 2.0
@@ -164,17 +163,6 @@ def standing_text(clearance_m: float, needed_m: float) -> str:
     if not 0.0 < clearance_m < math.inf:
         return "stands on the path"
     return f"leaves {clearance_m:.2f} m beside the swept width ({needed_m:.2f} m needed),"
-
-
-def speed_to_decide_by(commanded_mps: float, measured_mps: float) -> float:
-    """The greater of commanded and measured speed: braking for speed that is not there does less harm.
-
-    If the base moves backwards, the measured speed, because the decision has to know. measured_mps: not
-    finite if not known.
-    """
-    if not math.isfinite(measured_mps):
-        return commanded_mps
-    return measured_mps if measured_mps < BACKWARDS_MPS else max(commanded_mps, measured_mps)
 
 
 def min_start_mps(release: Release, comfort: BrakeLimits) -> float:

@@ -20,9 +20,9 @@ from controller.decision.camera_limits import condition_limit
 from controller.decision.decide import DecisionMaker
 from controller.decision.decision import Action, Decision, Reason
 from controller.decision.lens_cover import COVERED
-from controller.decision.limits import STANDING_MPS, Limit, Motion, speed_to_decide_by
+from controller.decision.limits import STANDING_MPS, Limit, Motion
 from controller.decision.obstacle_boxes import bodies_of
-from controller.decision.situation import SceneError, Situation
+from controller.decision.situation import SceneError, Situation, speed_to_decide_by
 from controller.decision.surfaces import check_scan
 from controller.governor.arc_ahead import ArcAhead
 from controller.governor.arcs import (

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from controller.braking import BrakeLimits
-from controller.decision.limits import Gap, Motion, speed_to_decide_by, standing_text, stop_before
+from controller.decision.limits import Gap, Motion, standing_text, stop_before
 
 COMFORT = BrakeLimits(0.3, 0.6)
 
@@ -83,20 +83,3 @@ def test_an_acceleration_under_way_lowers_the_limit() -> None:
     braking = stop_before(Gap(4.0), Motion(1.0, -0.3, 0.2), COMFORT, 0.45, 0.2, "static", "")
     assert speeding.speed_mps < steady.speed_mps
     assert braking.speed_mps == steady.speed_mps
-
-
-@pytest.mark.parametrize(
-    ("commanded_mps", "measured_mps", "expected_mps"),
-    [
-        (0.5, 0.6, 0.6),
-        (0.5, 0.4, 0.5),
-        (0.0, -0.04, 0.0),
-        (0.5, -0.06, -0.06),
-        (0.5, math.nan, 0.5),
-        (0.5, math.inf, 0.5),
-    ],
-)
-def test_the_greater_speed_counts_unless_the_base_goes_back(
-    commanded_mps: float, measured_mps: float, expected_mps: float
-) -> None:
-    assert speed_to_decide_by(commanded_mps, measured_mps) == expected_mps
