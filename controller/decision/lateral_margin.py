@@ -31,6 +31,11 @@ class LateralMargin:
         self._inside: set[int] = set()
         self._clear_since_s: dict[int, float] = {}
 
+    @property
+    def is_empty(self) -> bool:
+        """No body is in the way."""
+        return not self._inside
+
     def needed_m(self, track_id: int) -> float:
         """The clearance that a body has to leave, so as not to be in the way."""
         return self.farthest_m if track_id in self._inside else self.lateral_m

@@ -141,9 +141,10 @@ class MovingLimits:
 
     def _note_inside(self, watched: Watched, in_the_way: set[int]) -> None:
         """The bodies with these ids count as in the corridor; of the others, those that moved away do not."""
-        bodies = watched.bodies
-        away = bodies.moving & (watched.placed.clearance_m[:, 0] > self._beside.farthest_m)
-        self._beside.goes_out(bodies.ids[away].tolist())
+        if not self._beside.is_empty:
+            bodies = watched.bodies
+            away = bodies.moving & (watched.placed.clearance_m[:, 0] > self._beside.farthest_m)
+            self._beside.goes_out(bodies.ids[away].tolist())
         self._beside.comes_in(in_the_way)
 
     def _steadied(self, conflict: Conflict, track_id: int, now_s: float) -> Conflict:
