@@ -20,7 +20,7 @@ from controller.decision.corridor import BEYOND_RANGE_M, Corridor
 from controller.decision.held_surface import SAME_SURFACE_M, HeldSurface, Nearest
 from controller.decision.known_floor import KnownFloor
 from controller.decision.surfaces import Surfaces
-from controller.decision.view_edges import MIN_TAN, may_be_above_view_within_m
+from controller.decision.view_edges import MIN_TAN
 from hal.compiled import compiled
 from hal.types import CameraMount, FlagMatrix, Flags, FloatArray, PlanarPose
 from vision.scene import FreeSpace
@@ -123,7 +123,8 @@ class Sight:
 
     def _out_of_view_within_m(self, free: FreeSpace) -> float:
         """Distance ahead of the camera within which surfaces may have left the view, below it or above it."""
-        above_m = may_be_above_view_within_m(self._corridor.height_m, self._mount.height_m, free.up_tan)
+        rises_m = max(self._corridor.height_m - self._mount.height_m, 0.0)
+        above_m = rises_m / max(free.up_tan, MIN_TAN)
         if free.up_tan < MIN_TAN:  # the upper edge hardly rises: where things leave it is not known
             above_m = min(above_m, _MAX_ABOVE_M)
         return max(self._sight.near_m, free.floor_from_m, above_m)

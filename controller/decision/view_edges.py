@@ -72,12 +72,6 @@ def view_from(
     )
 
 
-def may_be_above_view_within_m(top_m: float, height_m: float, up_tan: float) -> float:
-    """Distance ahead of the camera below which something with its top at top_m may rise above the view."""
-    rise_m = top_m - height_m
-    return max(rise_m, 0.0) / max(up_tan, MIN_TAN)
-
-
 @inlined
 def ahead_and_left(point_m: FloatArray, view: CurrentView) -> tuple[float, float]:
     """How far a floor point (2,) is ahead of the camera, and to its left."""
