@@ -9,7 +9,8 @@ message; later imports take a moment. A cache that cannot be read is rebuilt. If
 start compiles and prints a message.
 
 Rules: a step takes numbers, arrays and records, does not change them, and returns new ones; inlined parts
-may write to the arrays they are given. Indices are not checked, so they must be in range. With
+may write to the arrays they are given. A part that is called in an innermost loop, and makes no array, is one
+in place: it costs nothing to hand it arrays. Indices are not checked, so they must be in range. With
 NUMBA_DISABLE_JIT=1 all steps run as plain Python, for a debugger; there 1.0 / 0.0 is an error.
 
 A record is an object whose class declares its fields, such as a dataclass or a section of the settings. Array
@@ -34,7 +35,7 @@ from hashlib import sha256
 from pathlib import Path
 from pickle import PickleError
 from types import FunctionType
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numba import njit, types
@@ -124,6 +125,29 @@ def inlined(function: Callable[P, R]) -> Callable[P, R]:
     part.py_func = function  # so it is already, but not with NUMBA_DISABLE_JIT=1; parts_of() needs it
     result: Callable[P, R] = part
     return result
+
+
+def in_place(function: Callable[P, R]) -> Callable[P, R]:
+    """Decorator for an inlined part that neither makes an array nor returns one, for innermost loops.
+
+    It may write to arrays that it is given, and look at parts of them. To be handed an array costs another
+    part 14 ns, in which it is counted who holds the array, and counted off again; this one does not count.
+    Its code becomes the caller's, where the compiler knows more of what it is given. Raises TypeError if it
+    may return an array: that would be one that nobody holds.
+    """
+    if not _plain(get_type_hints(function)["return"]):
+        raise TypeError(f"{function.__qualname__} may return an array, which a part in place must not")
+    part: Any = njit(error_model="numpy", forceinline=True, _nrt=False)(function)
+    part.py_func = function
+    result: Callable[P, R] = part
+    return result
+
+
+def _plain(hint: Any) -> bool:
+    """Whether a type is that of numbers, of nothing, or of tuples of these."""
+    if get_origin(hint) is tuple:
+        return all(map(_plain, get_args(hint)))
+    return isinstance(hint, type) and issubclass(hint, (int, float, np.generic, type(None)))
 
 
 def _build(

@@ -15,12 +15,11 @@ handles at a time; the gradient is 0 in what does not belong to the window. Offs
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hal.compiled import compiled, inlined
+from hal.compiled import compiled, in_place
 from vision.fragments.edges import GreyImage
 
 Values = NDArray[np.int16]
@@ -42,20 +41,7 @@ _SCHARR = 32.0
 _NEXT = np.uintp(1)
 
 
-class _Sought(NamedTuple):
-    """The window that is looked for.
-
-    gx, gy: its gradient. aim: the sums of its gradient times its grey levels. inverse: of its structure
-    tensor, xx, xy, yy.
-    """
-
-    gx: Values
-    gy: Values
-    aim: tuple[float, float]
-    inverse: tuple[float, float, float]
-
-
-@inlined
+@in_place
 def _load(image: GreyImage, top: int, left: int, rows: int, stride: int, out: Values) -> None:
     """Put rows of stride pixels, from top and left on, into out. Beyond its border the image is mirrored."""
     height, width = image.shape
@@ -72,7 +58,7 @@ def _load(image: GreyImage, top: int, left: int, rows: int, stride: int, out: Va
             out[i * stride + j] = image[v, max(min(u, 2 * (width - 1) - u), 0)]
 
 
-@inlined
+@in_place
 def _blend(values: Values, step: np.uintp, share: float, bits: int, count: np.uintp, out: Values) -> None:
     """Put values, interpolated with share towards those step farther on, times 2^bits, into out."""
     far = np.int32(share * (1 << _SHARE_BITS))
@@ -83,7 +69,7 @@ def _blend(values: Values, step: np.uintp, share: float, bits: int, count: np.ui
         out[k] = np.int32(both + half) >> shift
 
 
-@inlined
+@in_place
 def _smooth(values: Values, step: np.uintp, bits: int, count: np.uintp, out: Values) -> None:
     """Put 3, 10, 3 times values, which are step apart, divided by 2^bits, into out."""
     half = (1 << bits) >> 1
@@ -91,7 +77,7 @@ def _smooth(values: Values, step: np.uintp, bits: int, count: np.uintp, out: Val
         out[k] = (3 * (values[k] + values[k + step + step]) + 10 * values[k + step] + half) >> bits
 
 
-@inlined
+@in_place
 def _differ(values: Values, step: np.uintp, bits: int, count: np.uintp, out: Values) -> None:
     """Put the difference of values that are two steps apart, divided by 2^bits, into out."""
     half = (1 << bits) >> 1
@@ -99,7 +85,7 @@ def _differ(values: Values, step: np.uintp, bits: int, count: np.uintp, out: Val
         out[k] = (values[k + step + step] - values[k] + half) >> bits
 
 
-@inlined
+@in_place
 def _interpolate(
     values: Values, u: float, v: float, bits: int, stride: int, count: int, work: Values, out: Values
 ) -> None:
@@ -109,7 +95,7 @@ def _interpolate(
     _blend(work, down, v, 0, wanted, out)
 
 
-@inlined
+@in_place
 def _scharr(values: Values, bits: int, stride: int, count: int, work: Values, gx: Values, gy: Values) -> None:
     """Put Scharr's derivatives of values, divided by 2^bits, into gx and gy, for count pixels.
 
@@ -122,7 +108,7 @@ def _scharr(values: Values, bits: int, stride: int, count: int, work: Values, gx
     _smooth(work, _NEXT, bits, wanted, gy)
 
 
-@inlined
+@in_place
 def _blank_outside(
     top: int, left: int, rows: int, stride: int, image: GreyImage, gx: Values, gy: Values
 ) -> None:
@@ -133,26 +119,14 @@ def _blank_outside(
                 gx[i * stride + j] = gy[i * stride + j] = 0
 
 
-@inlined
+@in_place
 def _blank(inside: Values, count: np.uintp, values: Values) -> None:
     """Set values to 0 where inside is 0."""
     for k in range(count):
         values[k] *= inside[k]
 
 
-@inlined
-def _tensor(gx: Values, gy: Values, count: np.uintp) -> tuple[float, float, float]:
-    """Structure tensor xx, xy, yy: sums of products of the gradient, in (grey levels / px)^2."""
-    xx, xy, yy = 0, 0, 0
-    for k in range(count):
-        x, y = np.int32(gx[k]), np.int32(gy[k])
-        xx += int(np.int32(x * x))
-        xy += int(np.int32(x * y))
-        yy += int(np.int32(y * y))
-    return xx / _SCHARR**2, xy / _SCHARR**2, yy / _SCHARR**2
-
-
-@inlined
+@in_place
 def _sum(gradient: Values, grey: Values, start: np.uintp, count: np.uintp) -> float:
     """Sum of gradient times grey, which begins at start."""
     total = np.int32(0)
@@ -161,7 +135,19 @@ def _sum(gradient: Values, grey: Values, start: np.uintp, count: np.uintp) -> fl
     return float(total)
 
 
-@inlined
+@in_place
+def _tensor(gx: Values, gy: Values) -> tuple[float, float, float]:
+    """Structure tensor xx, xy, yy: sums of products of the gradient, in (grey levels / px)^2."""
+    xx, xy, yy, first, count = 0.0, 0.0, 0.0, np.uintp(0), np.uintp(_WINDOW)
+    for begin in range(0, len(gx), _WINDOW):  # the sums of so many products fit 32 bits
+        x, y = gx[begin : begin + _WINDOW], gy[begin : begin + _WINDOW]
+        xx += _sum(x, x, first, count)
+        xy += _sum(x, y, first, count)
+        yy += _sum(y, y, first, count)
+    return xx / _SCHARR**2, xy / _SCHARR**2, yy / _SCHARR**2
+
+
+@in_place
 def _four_sums(gradient: Values, grey: Values, stride: np.uintp, count: np.uintp) -> FourSums:
     """Sums of gradient times grey for the windows at four neighbouring pixels."""
     return (
@@ -172,7 +158,7 @@ def _four_sums(gradient: Values, grey: Values, stride: np.uintp, count: np.uintp
     )
 
 
-@inlined
+@in_place
 def _between(sums: FourSums, u: float, v: float) -> float:
     """The sum for the window that is u and v beyond the upper left one, by bilinear interpolation."""
     upper = sums[0] + u * (sums[1] - sums[0])
@@ -181,14 +167,14 @@ def _between(sums: FourSums, u: float, v: float) -> float:
     return result
 
 
-@inlined
+@in_place
 def _in_reach(top: int, left: int, side: int, image: GreyImage) -> bool:
     """Whether a window overlaps the image."""
     result: bool = -side <= top < image.shape[0] and -side <= left < image.shape[1]
     return result
 
 
-@inlined
+@in_place
 def _inverse(xx: float, xy: float, yy: float, side: int) -> tuple[bool, float, float, float]:
     """Whether a structure tensor can be inverted, and its inverse, for mismatches in the scale of _SCHARR."""
     smaller = 0.5 * (xx + yy - math.sqrt((xx - yy) ** 2 + 4.0 * xy * xy))
@@ -198,21 +184,23 @@ def _inverse(xx: float, xy: float, yy: float, side: int) -> tuple[bool, float, f
     return usable, scale * yy, -scale * xy, scale * xx
 
 
-@inlined
+@in_place
 def _follow(
     image: GreyImage,
     u: float,
     v: float,
     side: int,
     stride: int,
-    sought: _Sought,
+    gx: Values,
+    gy: Values,
+    aim: tuple[float, float],
+    inverse: tuple[float, float, float],
     patch: Values,
 ) -> tuple[bool, float, float]:
     """Move a window in image, from its upper left corner u, v, until it matches. False: it left the image.
 
     patch: work space.
     """
-    gx, gy, aim, inverse = sought
     down, window, left, top = np.uintp(stride), np.uintp(len(gx)), 0, 0
     last_u, last_v = math.inf, math.inf
     for iteration in range(ITERATIONS):
@@ -281,12 +269,13 @@ def search(
             _interpolate(pixel_gy, u, v, 0, stride, count, work, gy)
         _blank(inside, window, gx)
         _blank(inside, window, gy)
-        usable, xx, xy, yy = _inverse(*_tensor(gx, gy, window), side)
+        usable, xx, xy, yy = _inverse(*_tensor(gx, gy), side)
         if not usable:
             continue
         aim = _sum(gx, grey, first, window) / _EIGHTHS, _sum(gy, grey, first, window) / _EIGHTHS
-        sought = _Sought(gx, gy, aim, (xx, xy, yy))
-        found[n], u, v = _follow(now, guess[n, 0] - half, guess[n, 1] - half, side, stride, sought, patch)
+        found[n], u, v = _follow(
+            now, guess[n, 0] - half, guess[n, 1] - half, side, stride, gx, gy, aim, (xx, xy, yy), patch
+        )
         if found[n]:
             there[n, 0], there[n, 1] = u + half, v + half
     return there, found

@@ -10,6 +10,7 @@ import ast
 from collections.abc import Iterator
 from pathlib import Path
 
+PARTS = {"inlined", "in_place"}  # the decorators of parts
 ROOT = Path(__file__).resolve().parents[3]
 PACKAGES = ("controller", "hal", "sim", "vision")
 
@@ -39,7 +40,7 @@ def test_no_inlined_part_is_called_from_python() -> None:
         for path in (ROOT / name).rglob("*.py")
     }
     parts = {
-        module: {function.name for function, decorators in functions(tree) if "inlined" in decorators}
+        module: {function.name for function, decorators in functions(tree) if decorators & PARTS}
         for module, tree in trees.items()
     }
     called = []
@@ -48,7 +49,7 @@ def test_no_inlined_part_is_called_from_python() -> None:
         called += [
             f"{module}.{function.name} calls {call.func.id}"
             for function, decorators in functions(tree)
-            if module.startswith(PACKAGES) and not decorators & {"inlined", "compiled"}
+            if module.startswith(PACKAGES) and not decorators & {*PARTS, "compiled"}
             for call in ast.walk(function)
             if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id in known
         ]
