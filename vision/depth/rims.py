@@ -13,7 +13,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from hal.compiled import compiled, inlined
+from hal.compiled import compiled, in_place
 from hal.records import record
 from hal.types import FloatArray, Matrix
 from vision.depth.connected import IntGrid
@@ -49,7 +49,7 @@ def free_rims(grid: DepthGrid, labels: IntGrid, count: int) -> FreeRims:
     return FreeRims(*_free_rims(grid, labels, count))
 
 
-@inlined
+@in_place
 def _outermost(grid: DepthGrid, border: int, inwards: int) -> int:
     """The column at which the view of the depth camera ends; border, a side of the image, or further inwards.
 
@@ -64,7 +64,7 @@ def _outermost(grid: DepthGrid, border: int, inwards: int) -> int:
     return border
 
 
-@inlined
+@in_place
 def _is_free(
     grid: DepthGrid, row: int, rim: int, outwards: int, farthest: np.float32, first: int, last: int
 ) -> bool:

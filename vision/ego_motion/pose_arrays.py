@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from hal.compiled import inlined
+from hal.compiled import in_place, inlined
 from hal.types import FloatArray, Pose
 
 
@@ -56,7 +56,7 @@ def back_to(pose: FloatArray, start: FloatArray) -> FloatArray:
     return result
 
 
-@inlined
+@in_place
 def turned_back(pose: FloatArray, x: float, y: float, z: float) -> tuple[float, float, float]:
     """A vector of the fixed frame in the axes of the camera."""
     return (
@@ -66,7 +66,7 @@ def turned_back(pose: FloatArray, x: float, y: float, z: float) -> tuple[float, 
     )
 
 
-@inlined
+@in_place
 def in_camera(pose: FloatArray, point_m: FloatArray) -> tuple[float, float, float]:
     """A point (3,) of the fixed frame in the camera frame."""
     return turned_back(pose, point_m[0] - pose[0, 3], point_m[1] - pose[1, 3], point_m[2] - pose[2, 3])

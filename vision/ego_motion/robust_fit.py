@@ -14,7 +14,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from hal.compiled import compiled, inlined
+from hal.compiled import compiled, in_place, inlined
 from hal.records import record
 from hal.types import FloatArray, Pose
 from vision.camera.lens import MIN_AHEAD_M
@@ -137,7 +137,7 @@ def _linearised(
     return table, by_depth, depth_downweight, in_front
 
 
-@inlined
+@in_place
 def _chi2(rows: FloatArray, by_depth: FloatArray, depth_downweight: float) -> float:
     """Chi-square of a point with rows (2, 9) of table."""
     a, b = rows[0, _RESIDUAL], rows[1, _RESIDUAL]
@@ -146,7 +146,7 @@ def _chi2(rows: FloatArray, by_depth: FloatArray, depth_downweight: float) -> fl
     return result
 
 
-@inlined
+@in_place
 def _assumed_variance(rows: FloatArray, sigma: FloatArray) -> float:
     """Variance of a point's predicted position by the prior sigma (8,) alone, in pixel variances."""
     result = 0.0
@@ -155,7 +155,7 @@ def _assumed_variance(rows: FloatArray, sigma: FloatArray) -> float:
     return result
 
 
-@inlined
+@in_place
 def _add(
     rows: FloatArray, by_depth: FloatArray, depth_downweight: float, weight: float, normal: FloatArray
 ) -> None:
@@ -187,7 +187,7 @@ def _solved(matrix: FloatArray, side: FloatArray) -> FloatArray:
     return result
 
 
-@inlined
+@in_place
 def _add_prior(
     matrix: FloatArray, side: FloatArray, prior: FloatArray, to_prior: FloatArray, first: int, end: int
 ) -> None:
@@ -197,7 +197,7 @@ def _add_prior(
         side[i] += prior[i] * to_prior[i]
 
 
-@inlined
+@in_place
 def _reduce_residuals(table: FloatArray, step: FloatArray) -> None:
     """Put the residuals in table (N, 2, 9) to where they are after a step (8,), to first order."""
     for k in range(len(table)):

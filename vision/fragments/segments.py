@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from hal.compiled import compiled, inlined
+from hal.compiled import compiled, in_place, inlined
 from vision.fragments.contours import find_contours
 from vision.fragments.edges import GreyImage
 
@@ -75,7 +75,7 @@ def smaller_eigenvalue(uu: Reals, uv: Reals, vv: Reals) -> Reals:
     return smaller
 
 
-@inlined
+@in_place
 def _gradient_products(
     grey: GreyImage, u: int, v: int, uu: NDArray[np.int32], uv: NDArray[np.int32], vv: NDArray[np.int32]
 ) -> None:
@@ -89,7 +89,7 @@ def _gradient_products(
             uu[place], uv[place], vv[place] = du * du, du * dv, dv * dv
 
 
-@inlined
+@in_place
 def _sums(values: NDArray[np.int32], over_rows: NDArray[np.int32], out: NDArray[np.float32]) -> None:
     """Put a quarter of the sums of values (15 * 16,) over 7x7 px into out (9 * 16,), at pixels within 4 px.
 
@@ -108,7 +108,7 @@ def _sums(values: NDArray[np.int32], over_rows: NDArray[np.int32], out: NDArray[
         out[place] = np.float32(0.25) * np.float32(np.int32(total))
 
 
-@inlined
+@in_place
 def _most_corner_like(
     uu: NDArray[np.float32],
     uv: NDArray[np.float32],

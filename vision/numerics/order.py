@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from hal.compiled import compiled, inlined
+from hal.compiled import compiled, in_place, inlined
 from vision.camera.lens import RealArray
 
 _CHI2_THIRD = 0.811  # a third of chi-square with 2 degrees of freedom lies below it
@@ -56,7 +56,7 @@ def variance_ratio(chi2: RealArray) -> float:
     return quantile(chi2, 1.0 / 3.0) / _CHI2_THIRD
 
 
-@inlined
+@in_place
 def index_of(ordered: NDArray[np.int64], value: int) -> int:
     """Index of value in ordered (M,), which ascends; -1 if it is not among them."""
     place = int(np.searchsorted(ordered, value))
