@@ -3,6 +3,9 @@
 Depth is valid up to 10 m. An edge between a body and its background belongs to the body, but the depth image
 is least reliable just there. So depth is read from a small neighbourhood, whose samples form a near surface
 and, at a silhouette, a far one as well.
+
+Pixels are handled in lanes, side by side, as the processor computes: sample j of a lane is at
+j * _LANES + lane of a flat array.
 """
 
 from __future__ import annotations
@@ -11,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import DepthNoise, PerceptionConfig
-from hal.compiled import compiled, inlined
+from hal.compiled import compiled, in_place
 from hal.records import record
 from hal.types import DepthImage, FloatArray
 from vision.camera.lens import RealArray
@@ -24,6 +27,7 @@ _MIN_SUPPORT = 4  # minimum of valid samples, of 25: fewer are stray ones
 # Samples that are behind the near ones by more than this, the sum of both, are of another surface.
 _SAME_M, _SAME_SIGMAS = 0.06, 3.0
 _HOLES = 0.25  # share of samples without depth from which on there may be another, unseen surface
+_LANES = 32  # pixels handled at a time
 UNSEEN_M = 12.0  # assumed depth of an unseen surface
 _CUT_OFF = np.iinfo(np.uint16).max  # raw depth that stands for this distance and all larger ones
 
@@ -67,41 +71,86 @@ def surface_depth(
     return SurfaceDepth(near_m, far_m, holes)
 
 
-@inlined
-def _samples(
-    depth: DepthImage,
-    u: float,
-    v: float,
-    scale_m: np.float32,
-    min_m: np.float32,
-    into_m: NDArray[np.float32],
-) -> int:
-    """Put the valid samples around a pixel at the start of into_m (_SAMPLES,); returns how many there are.
-
-    Close to the border of the image the samples are shifted inwards.
-    """
+@in_place
+def _note_raw(depth: DepthImage, u: float, v: float, lane: int, raw: DepthImage) -> None:
+    """Put the samples around a pixel into its lane of raw; shifted inwards at the border of the image."""
     height, width = depth.shape
     column = min(max(int(np.rint(u)), _REACH_PX), width - 1 - _REACH_PX)
     row = min(max(int(np.rint(v)), _REACH_PX), height - 1 - _REACH_PX)
-    count = 0
-    for i in range(row - _REACH_PX, row + _REACH_PX + 1, _EVERY_PX):
-        for j in range(column - _REACH_PX, column + _REACH_PX + 1, _EVERY_PX):
-            into_m[count] = depth[i, j] * scale_m
-            count += into_m[count] >= min_m
-    return count
+    for i in range(-_REACH_PX, _REACH_PX + 1, _EVERY_PX):
+        for j in range(-_REACH_PX, _REACH_PX + 1, _EVERY_PX):
+            raw[lane] = depth[row + i, column + j]
+            lane += _LANES
 
 
-@inlined
-def _note_nearest(sample_m: NDArray[np.float32], count: int, nearest_m: NDArray[np.float32]) -> None:
-    """Put the nearest of the first count samples, in ascending order, into nearest_m (_NEAR_RANK + 1,)."""
+@in_place
+def _to_metres(
+    raw: DepthImage, scale_m: np.float32, min_m: np.float32, sample_m: NDArray[np.float32]
+) -> None:
+    """Put raw depths in metres into sample_m; NaN where they are not valid."""
+    for k in range(len(raw)):
+        one_m = np.float32(raw[k]) * scale_m
+        sample_m[k] = one_m if one_m >= min_m else np.float32(np.nan)
+
+
+@in_place
+def _count(sample_m: NDArray[np.float32], most_m: np.float32, count: NDArray[np.int32]) -> None:
+    """Put the number of samples up to most_m of each lane into count (_LANES,)."""
+    count[:] = 0
+    for j in range(_SAMPLES):
+        for lane in range(_LANES):
+            count[lane] += np.int32(sample_m[j * _LANES + lane] <= most_m)
+
+
+@in_place
+def _note_nearest(sample_m: NDArray[np.float32], nearest_m: NDArray[np.float32]) -> None:
+    """Put the nearest samples of each lane, in ascending order, into nearest_m (_NEAR_RANK + 1, _LANES)."""
     nearest_m[:] = np.inf
-    for j in range(count):
-        # Insertion without a branch, since mispredicted branches take longer.
-        farther_m = sample_m[j]
-        for place in range(_NEAR_RANK + 1):
-            held_m = nearest_m[place]
-            nearest_m[place] = held_m if held_m < farther_m else farther_m
-            farther_m = farther_m if held_m < farther_m else held_m
+    for j in range(_SAMPLES):
+        for lane in range(_LANES):
+            # Insertion without a branch.
+            farther_m = sample_m[j * _LANES + lane]
+            for place in range(lane, (_NEAR_RANK + 1) * _LANES, _LANES):
+                held_m = nearest_m[place]
+                nearest_m[place] = farther_m if farther_m < held_m else held_m
+                farther_m = held_m if farther_m < held_m else farther_m
+
+
+@in_place
+def _add_near(
+    sample_m: NDArray[np.float32],
+    max_m: np.float32,
+    anchor_m: NDArray[np.float32],
+    gate_m: NDArray[np.float32],
+    total_m: FloatArray,
+    count: NDArray[np.int32],
+) -> None:
+    """Put sum and number of the samples of each lane that lie at anchor_m, (_LANES,) each."""
+    total_m[:], count[:] = 0.0, 0
+    for j in range(_SAMPLES):
+        for lane in range(_LANES):
+            one_m = sample_m[j * _LANES + lane]
+            near = (abs(one_m - anchor_m[lane]) <= gate_m[lane]) & (one_m <= max_m)
+            total_m[lane] += float(one_m) if near else 0.0
+            count[lane] += np.int32(near)
+
+
+@in_place
+def _add_far(
+    sample_m: NDArray[np.float32],
+    anchor_m: NDArray[np.float32],
+    gate_m: NDArray[np.float32],
+    total_m: FloatArray,
+    count: NDArray[np.int32],
+) -> None:
+    """Put sum and number of the samples of each lane that lie behind anchor_m, (_LANES,) each."""
+    total_m[:], count[:] = 0.0, 0
+    for j in range(_SAMPLES):
+        for lane in range(_LANES):
+            one_m = sample_m[j * _LANES + lane]
+            far = one_m - anchor_m[lane] > gate_m[lane]
+            total_m[lane] += float(one_m) if far else 0.0
+            count[lane] += np.int32(far)
 
 
 @compiled("uint16[:, ::1], float64[:, ::1], float32, float32, float32", DepthNoise)
@@ -116,32 +165,35 @@ def _surfaces(
     """near_m, far_m and holes of SurfaceDepth. max_m: of the near surface."""
     count = len(pixels)
     near_m, far_m, holes = np.full(count, np.nan), np.full(count, np.nan), np.empty(count)
-    sample_m, nearest_m = np.empty(_SAMPLES, np.float32), np.empty(_NEAR_RANK + 1, np.float32)
-    for k in range(count):
-        measured = _samples(depth, pixels[k, 0], pixels[k, 1], scale_m, min_m, sample_m)
-        holes[k] = 1.0 - measured / _SAMPLES
-        within = 0
-        for j in range(measured):
-            within += sample_m[j] <= max_m
-        if within < _MIN_SUPPORT:
-            continue
-        _note_nearest(sample_m, measured, nearest_m)
-        # With many holes the rank is lowered to a third of the valid samples.
-        anchor_m = nearest_m[min(_NEAR_RANK, within // 3)]
-        gate_m = np.float32(_SAME_M + _SAME_SIGMAS * depth_sigma_of(anchor_m, noise))
-        near_sum, near_count, far_sum, far_count = 0.0, 0, 0.0, 0
-        for j in range(measured):
-            behind_m = sample_m[j] - anchor_m
-            far = behind_m > gate_m
-            near = (abs(behind_m) <= gate_m) & (sample_m[j] <= max_m)
-            far_sum += float(sample_m[j]) if far else 0.0
-            near_sum += float(sample_m[j]) if near else 0.0
-            far_count += far
-            near_count += near
-        if near_count < 2:
-            continue
-        near_m[k] = near_sum / near_count
-        far_m[k] = far_sum / far_count if far_count >= 2 else near_m[k]
-        if holes[k] >= _HOLES:
-            far_m[k] = max(far_m[k], UNSEEN_M)
+    raw, sample_m = np.zeros(_SAMPLES * _LANES, np.uint16), np.empty(_SAMPLES * _LANES, np.float32)
+    nearest_m = np.empty((_NEAR_RANK + 1) * _LANES, np.float32)
+    anchor_m, gate_m = np.empty(_LANES, np.float32), np.empty(_LANES, np.float32)
+    near_total_m, far_total_m = np.empty(_LANES), np.empty(_LANES)
+    near_count, far_count = np.empty(_LANES, np.int32), np.empty(_LANES, np.int32)
+    measured, within = np.empty(_LANES, np.int32), np.empty(_LANES, np.int32)
+    for first in range(0, count, _LANES):
+        lanes = min(_LANES, count - first)
+        for lane in range(lanes):
+            k = first + lane
+            _note_raw(depth, pixels[k, 0], pixels[k, 1], lane, raw)
+        _to_metres(raw, scale_m, min_m, sample_m)
+        _count(sample_m, np.float32(np.inf), measured)
+        _count(sample_m, max_m, within)
+        _note_nearest(sample_m, nearest_m)
+        for lane in range(_LANES):
+            # With many holes the rank is lowered to a third of the valid samples.
+            rank = min(_NEAR_RANK, within[lane] // 3)
+            anchor_m[lane] = nearest_m[rank * _LANES + lane]
+            gate_m[lane] = _SAME_M + _SAME_SIGMAS * depth_sigma_of(anchor_m[lane], noise)
+        _add_near(sample_m, max_m, anchor_m, gate_m, near_total_m, near_count)
+        _add_far(sample_m, anchor_m, gate_m, far_total_m, far_count)
+        for lane in range(lanes):
+            k = first + lane
+            holes[k] = 1.0 - measured[lane] / _SAMPLES
+            if within[lane] < _MIN_SUPPORT or near_count[lane] < 2:
+                continue
+            near_m[k] = near_total_m[lane] / near_count[lane]
+            far_m[k] = far_total_m[lane] / far_count[lane] if far_count[lane] >= 2 else near_m[k]
+            if holes[k] >= _HOLES:
+                far_m[k] = max(far_m[k], UNSEEN_M)
     return near_m, far_m, holes
