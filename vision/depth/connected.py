@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from hal.compiled import compiled, inlined
 from vision.depth.depth_grid import BoolGrid, DepthGrid, FloatGrid
+from vision.numerics.order import median_of_positive
 
 IntGrid = NDArray[np.int32]
 
@@ -69,11 +70,7 @@ def _usual_step(inverse: FloatGrid, mask: BoolGrid) -> float:
             if mask[i, j] and mask[i, j + 1]:
                 steps[count] = abs(inverse[i, j + 1] - inverse[i, j])
                 count += 1
-    if count == 0:
-        return 0.0
-    ordered = np.partition(steps[:count], count // 2)
-    upper = float(ordered[count // 2])
-    return upper if count % 2 else 0.5 * (float(ordered[: count // 2].max()) + upper)
+    return median_of_positive(steps[:count]) if count > 0 else 0.0
 
 
 @compiled("float32[:, ::1], boolean[:, ::1]")

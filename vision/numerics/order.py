@@ -36,6 +36,31 @@ def median_of(values: NDArray[np.float32]) -> np.float32:
     return upper if len(values) % 2 == 1 else np.float32(0.5) * (ordered[:middle].max() + upper)
 
 
+@in_place
+def _of_rank(values: NDArray[np.float32], rank: int) -> float:
+    """The one of values (N,), none of them negative, that comes after rank others in ascending order.
+
+    Such numbers are in the order of their bits, which are found one by one, from the highest on, by counting
+    the values that are less. That is quicker than to sort in part: the processor compares sixteen at once.
+    """
+    bits, found = values.view(np.int32), np.int32(0)
+    for place in range(30, -1, -1):
+        tried, less = np.int32(found | (1 << place)), np.int32(0)
+        for k in range(len(bits)):
+            less = np.int32(less + np.int32(bits[k] < tried))
+        if less <= rank:
+            found = tried
+    return float(np.int32(found).view(np.float32))
+
+
+@in_place
+def median_of_positive(values: NDArray[np.float32]) -> float:
+    """Median of values (N,), N > 0, none of them negative."""
+    middle = len(values) // 2
+    upper = _of_rank(values, middle)
+    return upper if len(values) % 2 == 1 else 0.5 * (_of_rank(values, middle - 1) + upper)
+
+
 def quantiles(values: RealArray, shares: Sequence[float]) -> tuple[float, ...]:
     """Quantiles of values (N,), N > 0, with linear interpolation: share 0 is the smallest, 1 the largest."""
     ordered = np.sort(values)

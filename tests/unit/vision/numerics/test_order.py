@@ -1,7 +1,14 @@
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from vision.numerics.order import indices_of, median, quantile, variance_ratio
+from hal.compiled import compiled
+from vision.numerics.order import indices_of, median, median_of_positive, quantile, variance_ratio
+
+
+@compiled("float32[::1]")
+def positive_median(values: NDArray[np.float32]) -> float:
+    return median_of_positive(values)
 
 
 @pytest.mark.parametrize(
@@ -18,6 +25,20 @@ def test_median_of_rows_is_that_of_numpy_and_keeps_single_precision(count: int) 
     found = median(values)
     assert found.dtype == np.float32
     np.testing.assert_array_equal(found, np.median(values, axis=1))
+
+
+@pytest.mark.parametrize(
+    "values", [[0.0], [3.0, 1.0], [0.0, 0.0, 2.0], [1e-30, 7.0, 7.0, 9.0], [3e38, 1e-3, np.inf]]
+)
+def test_median_of_positive_values_is_that_of_numpy(values: list[float]) -> None:
+    given = np.array(values, np.float32)
+    assert positive_median(given) == np.median(given.astype(float))
+
+
+@pytest.mark.parametrize("count", [2, 33, 1000, 1001])
+def test_median_of_many_positive_values_with_equal_ones_among_them(count: int) -> None:
+    given = np.round(np.random.default_rng(count).exponential(0.1, count), 3).astype(np.float32)
+    assert positive_median(given) == np.median(given.astype(float))
 
 
 @pytest.mark.parametrize(("share", "expected"), [(0.0, 1.0), (0.25, 2.0), (0.5, 3.0), (0.9, 7.4), (1.0, 9.0)])
