@@ -4,7 +4,7 @@ Steps, with their modules: velocities of fragments (least_squares); arrived and 
 cells to tracks (masks, connected, votes, grouping, births); suspects and furniture cut out (carving,
 left_behind, cutting); movers extended to the floor (grounding); bodies joined and divided (regrouping);
 filters (sightings, rim_motion, approach); what hangs (hanging); fragments to tracks (adoption); velocities of
-bodies (least_squares); verdict (judgement); report. Terms: vision/__init__.py.
+bodies (least_squares, one_edge); verdict (judgement); report. Terms: vision/__init__.py.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ from vision.depth.free_space import free_space
 from vision.depth.near_floor import NearFloor
 from vision.depth.regions import Regions
 from vision.detection import Detection
-from vision.motion import least_squares, limbs, sliding
+from vision.motion import least_squares, limbs, one_edge, sliding
 from vision.motion.least_squares import BodyVelocities, FragmentVelocities
 from vision.percept import Percept
 from vision.scene import CameraCondition, FreeSpace, Scene
@@ -213,14 +213,11 @@ class Tracker:
         rotation = detection.pose.rotation
         index = tracks.index_of(owner)
         tracks.fragments = np.bincount(index + 1, minlength=len(tracks) + 1)[1:]
+        of_ends, start_mps = np.repeat(index, 2), tracks.velocity_mps @ rotation
         body = least_squares.body_velocities(
-            detection.motion,
-            velocities.per_end,
-            np.repeat(index, 2),
-            len(tracks),
-            tracks.velocity_mps @ rotation,
-            max_mps,
+            detection.motion, velocities.per_end, of_ends, len(tracks), start_mps, max_mps
         )
+        body = one_edge.without_way_along(body, detection.motion, of_ends, detection.camera.fx)
         use = limbs.believable(body).nonzero()[0]
         if len(use):
             # The time windows of successive frames overlap: a frame adds dt / window of a new measurement.

@@ -11,6 +11,7 @@ In track (vision/tracker.py):
 * velocities - the linear equations for the velocity of a point over ground (eqs. 6 to 9).
 * least_squares - velocities of fragments and of bodies from these equations.
 * moving_fragments - which fragments move, which are static, and which move alike.
+* one_edge - what fragments on one straight edge cannot tell of their body's motion.
 * limbs - when to believe fragments of a body that disagree.
 * sliding - when few fragments of a body tell nothing of its motion along the line of sight.
 * line_of_sight - velocities along and across the line of sight, in their own sigmas.

@@ -14,7 +14,7 @@ from hal.records import record
 from hal.types import FloatArray, Integers, Matrices, Matrix, Vector
 from vision.motion.velocities import EndResiduals, normal_equations
 
-_ROBUST_CHI2 = 9.0  # 99 % of ends that move with the body, 2 degrees of freedom; others lose their weight
+ROBUST_CHI2 = 9.0  # 99 % of ends that move with the body, 2 degrees of freedom; others lose their weight
 _MEDIAN_CHI2 = 1.386  # median for 2 degrees of freedom
 _SPREAD_ENDS = 6  # minimum number of ends to estimate their scatter
 _MOVED_CHI2 = 13.8  # 99.9 % of static ends, 2 degrees of freedom; ends above contradict standing still
@@ -194,7 +194,7 @@ def _spread(chi2: FloatArray) -> float:
 
 
 @inlined
-def _information(covariance: FloatArray, effect: FloatArray, result: FloatArray) -> None:
+def end_information(covariance: FloatArray, effect: FloatArray, result: FloatArray) -> None:
     """Put the inverse of covariance + effect * effect' into result (3,): its entries xx, xy, yy.
 
     covariance (3,): xx, xy, yy. effect (2,): change by one sigma of depth.
@@ -207,7 +207,7 @@ def _information(covariance: FloatArray, effect: FloatArray, result: FloatArray)
 
 
 @inlined
-def _chi2(motion: EndResiduals, k: int, velocity_mps: FloatArray, information: FloatArray) -> float:
+def end_chi2(motion: EndResiduals, k: int, velocity_mps: FloatArray, information: FloatArray) -> float:
     """Chi-square of end k with this information (3,) under the hypothesis of velocity (3,)."""
     ray, residual_m, lag_s = motion.ray[k], motion.residual_m[k], motion.lag_s[k]
     a = residual_m[0] - lag_s * (velocity_mps[0] - ray[0] * velocity_mps[2])
@@ -236,7 +236,7 @@ def _bodies(
     agreement, contradicts_static = np.zeros(bodies), np.zeros(bodies)
     information, sums = np.empty((len(motion.lag_s), 3)), np.empty(14)
     for k in members:
-        _information(motion.covariance[k], motion.depth_effect[k], information[k])
+        end_information(motion.covariance[k], motion.depth_effect[k], information[k])
     for g in range(bodies):
         own = members[first[g] : first[g + 1]]
         ends = len(own)
@@ -245,8 +245,8 @@ def _bodies(
         for scale in _ANNEAL:
             for j in range(ends):
                 k = own[j]
-                chi2[j] = _chi2(motion, k, velocity_mps[g], information[k])
-            admitted = scale * _ROBUST_CHI2 * _spread(chi2)
+                chi2[j] = end_chi2(motion, k, velocity_mps[g], information[k])
+            admitted = scale * ROBUST_CHI2 * _spread(chi2)
             sums[:] = 0.0
             for j in range(ends):
                 weight = 1.0 / (1.0 + chi2[j] / admitted) ** 2
@@ -256,12 +256,12 @@ def _bodies(
             _solve(sums, max_speed_mps, velocity_mps[g], spread_out[g])
         for j in range(ends):
             k = own[j]
-            chi2[j] = _chi2(motion, k, velocity_mps[g], information[k])
-            agreement[g] += chi2[j] <= _ROBUST_CHI2
+            chi2[j] = end_chi2(motion, k, velocity_mps[g], information[k])
+            agreement[g] += chi2[j] <= ROBUST_CHI2
             contradicts_static[g] += motion.static_chi2[k] > _MOVED_CHI2
         agreement[g] /= max(ends, 1)
         contradicts_static[g] /= max(ends, 1)
         # Motion that the model does not explain (limbs, rotation, sliding) increases the covariance.
-        excess = np.minimum(chi2, _ROBUST_CHI2 * _spread(chi2)).sum() / max(2.0 * ends - 3.0, 1.0)
+        excess = np.minimum(chi2, ROBUST_CHI2 * _spread(chi2)).sum() / max(2.0 * ends - 3.0, 1.0)
         spread_out[g] *= max(1.0, excess)
     return velocity_mps, spread_out, agreement, contradicts_static

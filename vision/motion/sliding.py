@@ -17,7 +17,7 @@ from hal.types import FloatArray
 from vision.motion.least_squares import BodyVelocities
 
 _MANY_ENDS = 8  # four fragments, as for a proof of motion along the line of sight (proof_rules.py)
-_SLIDING_MPS = 3.0  # an end slides about as fast as its body and the robot move
+SLIDING_MPS = 3.0  # an end slides about as fast as its body and the robot move
 
 
 @compiled(BodyVelocities, "boolean[:], int64[::1], float64[:, :]")
@@ -34,5 +34,5 @@ def variance(
         if cut[t] and body.agreement[t] * body.ends[t] < _MANY_ENDS:
             for i in range(3):
                 for j in range(3):
-                    result[k, i, j] = _SLIDING_MPS**2 * (sight[t, i] * sight[t, j])
+                    result[k, i, j] = SLIDING_MPS**2 * (sight[t, i] * sight[t, j])
     return result

@@ -168,7 +168,7 @@ def test_bodies_are_solved_as_a_general_solver_does() -> None:
 def test_information_of_an_end_is_the_inverse_of_its_covariance() -> None:
     # [[1, 0.5], [0.5, 1]] + [[1, 0.5], [0.5, 0.25]] = [[2, 1], [1, 1.25]], determinant 1.5.
     result = np.empty(3)
-    least_squares._information(np.array([1.0, 0.5, 1.0]), np.array([1.0, 0.5]), result)
+    least_squares.end_information(np.array([1.0, 0.5, 1.0]), np.array([1.0, 0.5]), result)
     np.testing.assert_allclose(result, np.array([1.25, -1.0, 2.0]) / 1.5)
 
 
