@@ -39,6 +39,7 @@ _EQUAL_MPS = 0.25  # maximum difference in velocity of the parts of a rigid thin
 _CLOSE_MPS = 0.4  # maximum difference in velocity of two parts of one body, besides noise
 _KNOWN_SIGMA_MPS = 0.35  # with a larger standard deviation no two velocities are surely alike
 _COMPATIBLE_SIGMAS = 2.0  # more difference for noise: a shank that stands, or swings, on a body that moves
+_BY_ITSELF_S = 1.0  # a limb or a piece is seldom a mover of its own for longer
 _MIN_MOVING_MPS = 0.3  # a slower track moves like anything static
 
 
@@ -54,6 +55,7 @@ class _Pairs:
     size_plausible: by their sizes they could be one body.
     tiny: the small one is, compared with the large one.
     wide: one of the two is wider than a person.
+    by_itself: the small one has long moved as a track of its own.
     moves: the large one does, faster than anything static seems to.
     slower_mps: speed of the slower one.
     differ_mps: difference of their velocities.
@@ -70,6 +72,7 @@ class _Pairs:
     size_plausible: BoolArray
     tiny: BoolArray
     wide: BoolArray
+    by_itself: BoolArray
     moves: BoolArray
     slower_mps: FloatArray
     differ_mps: FloatArray
@@ -84,16 +87,18 @@ def pairs_to_merge(
     sigma_mps: FloatArray,
     mover: BoolArray,
     moving: BoolArray,
+    moving_s: FloatArray,
 ) -> list[tuple[int, int]]:
     """Pairs (small, large) of tracks that may be one body, the closest pairs first.
 
     The small one is a suspect or mover (mover (T,)); the large one moves by the verdict (moving (T,)). One
-    track may be in several pairs. velocity_mps (T, 3), sigma_mps (T,): of the tracks.
+    track may be in several pairs. velocity_mps (T, 3), sigma_mps (T,): of the tracks. moving_s (T,): for how
+    long they have been moving by the verdict.
     """
     small, large = _candidates(regions.cells, mover, moving)
     if len(small) == 0:
         return []
-    pairs = _paired(regions, velocity_mps, sigma_mps, small, large)
+    pairs = _paired(regions, velocity_mps, sigma_mps, moving_s >= _BY_ITSELF_S, small, large)
     one = _beside(pairs)
     halves = _halves(pairs) & ~one
     if halves.any():
@@ -127,6 +132,7 @@ def _paired(
     regions: Regions,
     velocity_mps: FloatArray,
     sigma_mps: FloatArray,
+    by_itself: BoolArray,
     small: NDArray[np.intp],
     large: NDArray[np.intp],
 ) -> _Pairs:
@@ -151,6 +157,7 @@ def _paired(
         size_plausible=(cells[small] <= _SMALL_SHARE * cells[large]) | person_width | overlapping,
         tiny=cells[small] <= _TINY_SHARE * cells[large],
         wide=np.maximum(regions.extent_m[small, 0], regions.extent_m[large, 0]) > SINGLE_WIDTH_M,
+        by_itself=by_itself[small],
         moves=squared_mps[large] > _MIN_MOVING_MPS**2,
         slower_mps=np.sqrt(np.minimum(squared_mps[small], squared_mps[large])),
         differ_mps=differ_mps,
@@ -160,9 +167,13 @@ def _paired(
 
 
 def _beside(pairs: _Pairs) -> BoolArray:
-    """(K,) a small track close to a mover, with a velocity that does not contradict."""
+    """(K,) a small track close to a mover, with a velocity that does not contradict.
+
+    Noise is no excuse for a small one that has long moved by itself: it is mostly somebody who passes.
+    """
     reach_m = np.where(pairs.overlapping, _CLOSE_OVERLAPPING_M, _CLOSE_M)
-    return pairs.velocities_compatible & pairs.size_plausible & (pairs.gap_m <= reach_m)
+    alike = pairs.velocities_compatible & (~pairs.by_itself | (pairs.differ_mps <= _CLOSE_MPS))
+    return alike & pairs.size_plausible & (pairs.gap_m <= reach_m)
 
 
 def _piece(pairs: _Pairs) -> BoolArray:

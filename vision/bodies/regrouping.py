@@ -33,7 +33,13 @@ def regrouped(
         return None
     grid = detection.grid
     pairs = pairs_to_merge(
-        grid, measured, tracks.velocity_mps, tracks.velocity_sigma_mps, tracks.mover, tracks.moving
+        grid,
+        measured,
+        tracks.velocity_mps,
+        tracks.velocity_sigma_mps,
+        tracks.mover,
+        tracks.moving,
+        tracks.moving_s,
     )
     displacement_m = tracks.speed_mps * changes.stayed_s
     labels, gone = merge_labels(grid, labels, pairs, changes.stayed, displacement_m)

@@ -20,6 +20,9 @@ from vision.numerics import kalman
 from vision.numerics.order import indices_of
 
 _TRAIL_S = 0.3  # time constant of the trailing average of a centre: several frames, less than a step lasts
+# Share of the acceleration's density in the second opinion, by the surface alone: what goes slowly but
+# steadily is to be told from what stands.
+_STEADY_SHARE = 0.25
 # A track really advances if its centre advances at this share of the filtered velocity at least. The centre
 # of something static does not advance; its filtered velocity is noise.
 _MIN_ADVANCE_SHARE = 0.4
@@ -171,10 +174,11 @@ class Tracks:
         accel_density: spectral density of the acceleration, (m/s^2)^2 s. up (3,): the floor's normal, along
         which a velocity dies out; None where it is not known.
         """
+        surface_density = _STEADY_SHARE * accel_density
         if len(self) and dt_s > 0:
             self.state, self.covariance = kalman.predict(self.state, self.covariance, dt_s, accel_density, up)
             self.surface_state, self.surface_covariance = kalman.predict(
-                self.surface_state, self.surface_covariance, dt_s, accel_density, up
+                self.surface_state, self.surface_covariance, dt_s, surface_density, up
             )
 
     def update_trailing_average(self, dt_s: float) -> NDArray[np.bool_]:

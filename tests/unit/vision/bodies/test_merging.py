@@ -17,6 +17,7 @@ def merged(
     sigma: float = 0.05,
     moving: list[bool] | None = None,
     mover: list[bool] | None = None,
+    moving_s: float = 0.9,
     behind_m: float = 9.0,
 ) -> list[tuple[int, int]]:
     """All move alike, and all are known as moving, unless said otherwise. behind_m: of what is seen between
@@ -31,6 +32,7 @@ def merged(
         np.full(count, sigma),
         np.array(mover or known),
         np.array(known),
+        np.full(count, moving_s),
     )
 
 
@@ -54,6 +56,16 @@ def test_a_part_with_another_velocity_is_not() -> None:
     # Two sigmas of the difference explain the rest of it: 0.6 <= 0.4 + 2 * 0.071 * sqrt(2).
     assert merged(PERSON, ARM, velocity=speeds, sigma=0.069) == []
     assert merged(PERSON, ARM, velocity=speeds, sigma=0.072) == [(1, 0)]
+
+
+def test_noise_does_not_excuse_who_has_long_moved_by_himself() -> None:
+    """As somebody who passes a cart, 0.6 m/s slower than it."""
+    speeds = [(0.8, 0.0, 0.0), (0.2, 0.0, 0.0)]
+    assert merged(PERSON, ARM, velocity=speeds, sigma=0.2, moving_s=0.99) == [(1, 0)]
+    assert merged(PERSON, ARM, velocity=speeds, sigma=0.2, moving_s=1.0) == []
+    # With about the same velocity it is still a part.
+    alike = [(0.8, 0.0, 0.0), (0.41, 0.0, 0.0)]
+    assert merged(PERSON, ARM, velocity=alike, sigma=0.2, moving_s=5.0) == [(1, 0)]
 
 
 def test_only_a_mover_takes_and_only_a_suspect_is_taken() -> None:

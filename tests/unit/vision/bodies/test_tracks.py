@@ -21,6 +21,16 @@ def test_a_centre_goes_that_has_gone_about_as_fast_as_its_velocity_says(dt_s: fl
     np.testing.assert_array_equal(advances, [True, True, False, False])
 
 
+def test_the_second_opinion_allows_for_a_quarter_of_the_acceleration() -> None:
+    """In 2 s a density of 0.1 (m/s^2)^2 s adds 0.2 and 0.05 (m/s)^2 to the variance of a velocity."""
+    tracks = Tracks()
+    tracks.start(np.zeros((1, 3)), 0.1, 1.5, 0.0, 0)
+    tracks.predict(2.0, 0.1, None)
+    assert tracks.covariance[0, 3, 3] == pytest.approx(1.5**2 + 0.2)
+    assert tracks.surface_covariance[0, 3, 3] == pytest.approx(1.5**2 + 0.05)
+    np.testing.assert_array_equal(tracks.state, tracks.surface_state)
+
+
 def test_trailing_average_follows_its_track() -> None:
     tracks = Tracks()
     tracks.start(np.zeros((2, 3)), 0.1, 1.5, 0.0, 0)
