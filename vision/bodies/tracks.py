@@ -171,8 +171,8 @@ class Tracks:
     def predict(self, dt_s: float, accel_density: float, up: FloatArray | None) -> None:
         """Predict all tracks dt_s ahead.
 
-        accel_density: spectral density of the acceleration, (m/s^2)^2 s. up (3,): the floor's normal, along
-        which a velocity dies out; None where it is not known.
+        accel_density: spectral density of the acceleration, (m/s^2)^2 s; for the surface alone a quarter of
+        it. up (3,): the floor's normal, along which a velocity dies out; None where it is not known.
         """
         surface_density = _STEADY_SHARE * accel_density
         if len(self) and dt_s > 0:

@@ -17,7 +17,7 @@ from vision.motion.velocities import EndResiduals, normal_equations
 ROBUST_CHI2 = 9.0  # 99 % of ends that move with the body, 2 degrees of freedom; others lose their weight
 _MEDIAN_CHI2 = 1.386  # median for 2 degrees of freedom
 _SPREAD_ENDS = 6  # minimum number of ends to estimate their scatter
-_MOVED_CHI2 = 13.8  # 99.9 % of static ends, 2 degrees of freedom; ends above contradict standing still
+MOVED_CHI2 = 13.8  # 99.9 % of static ends, 2 degrees of freedom; ends above contradict standing still
 # Scale of the robust weights: from plain least squares to robust, so that a mover is not held at the start
 # velocity of 0.
 _ANNEAL = (64.0, 16.0, 4.0, 1.0)
@@ -258,7 +258,7 @@ def _bodies(
             k = own[j]
             chi2[j] = end_chi2(motion, k, velocity_mps[g], information[k])
             agreement[g] += chi2[j] <= ROBUST_CHI2
-            contradicts_static[g] += motion.static_chi2[k] > _MOVED_CHI2
+            contradicts_static[g] += motion.static_chi2[k] > MOVED_CHI2
         agreement[g] /= max(ends, 1)
         contradicts_static[g] /= max(ends, 1)
         # Motion that the model does not explain (limbs, rotation, sliding) increases the covariance.

@@ -19,16 +19,22 @@ from numpy.typing import NDArray
 
 from hal.compiled import compiled
 from hal.types import FloatArray
-from vision.motion.least_squares import ROBUST_CHI2, BodyVelocities, end_chi2, end_information
+from vision.motion.least_squares import (
+    MOVED_CHI2,
+    ROBUST_CHI2,
+    BodyVelocities,
+    end_chi2,
+    end_information,
+)
 from vision.motion.sliding import SLIDING_MPS
 from vision.motion.velocities import EndResiduals
 
 _MIN_ENDS = 4  # two fragments
-_STRAIGHT_PX = (
-    2.0  # root mean square distance of the ends from the edge; the two sides of a pole are farther apart
-)
+# Of the ends from their edge, root mean square. The sides of a pole that is not far away are farther apart.
+_STRAIGHT_PX = 2.0
 _LONG = 4.0  # minimum length of the edge relative to that, both as standard deviations of the ends
-_MOVED_CHI2 = 10.8  # 99.9 % of static ends, 1 degree of freedom
+_ON_EDGE = 2.0  # times that: an end farther from the edge is not on it
+_MOVED_ACROSS_CHI2 = 10.8  # 99.9 % of static ends, 1 degree of freedom
 
 
 def without_way_along(
@@ -37,15 +43,17 @@ def without_way_along(
     """body, with what the ends on one edge cannot tell taken out.
 
     Where all ends that agree with the velocity of a body lie on one straight edge, its covariance gains 3 m/s
-    along the edge and along the line of sight, and only motion across the edge contradicts standing still.
+    along the edge and along the line of sight, and ends on that edge contradict standing still only if they
+    have moved across it.
 
     owner (2N,): body of each end, -1 for none. focal_px: of the camera.
     """
     owner = np.ascontiguousarray(owner, np.int64)
-    middle, direction = _edges(body, motion, owner, _STRAIGHT_PX / focal_px)
+    straight = _STRAIGHT_PX / focal_px
+    middle, direction = _edges(body, motion, owner, straight)
     if not direction.any():
         return body
-    covariance, contradicts_static = _across(body, motion, owner, middle, direction)
+    covariance, contradicts_static = _across(body, motion, owner, middle, direction, straight)
     return replace(body, covariance=covariance, contradicts_static=contradicts_static)
 
 
@@ -89,15 +97,16 @@ def _edges(
     return middle, direction
 
 
-@compiled(BodyVelocities, EndResiduals, "int64[::1], float64[:, ::1], float64[:, ::1]")
+@compiled(BodyVelocities, EndResiduals, "int64[::1], float64[:, ::1], float64[:, ::1], float64")
 def _across(
     body: BodyVelocities,
     motion: EndResiduals,
     owner: NDArray[np.int64],
     middle: FloatArray,
     direction: FloatArray,
+    straight: float,
 ) -> tuple[FloatArray, FloatArray]:
-    """covariance and contradicts_static as of without_way_along. middle, direction: see _edges."""
+    """covariance and contradicts_static as of without_way_along. middle, direction, straight: see _edges."""
     covariance, contradicts = body.covariance.copy(), body.contradicts_static.copy()
     moved = np.zeros(len(body.ends))
     for k in range(len(owner)):
@@ -109,7 +118,9 @@ def _across(
             effect_m = a * motion.depth_effect[k, 0] + b * motion.depth_effect[k, 1]
             xx, xy, yy = motion.covariance[k]
             variance = a * a * xx + 2.0 * a * b * xy + b * b * yy + effect_m * effect_m
-            moved[g] += residual_m * residual_m > _MOVED_CHI2 * variance
+            away = a * (motion.ray[k, 0] - middle[g, 0]) + b * (motion.ray[k, 1] - middle[g, 1])
+            across = residual_m * residual_m > _MOVED_ACROSS_CHI2 * variance
+            moved[g] += motion.static_chi2[k] > MOVED_CHI2 and (across or abs(away) > _ON_EDGE * straight)
     for g in range(len(moved)):
         along, x, y = direction[g], middle[g, 0], middle[g, 1]
         if along[0] == 0.0 and along[1] == 0.0:

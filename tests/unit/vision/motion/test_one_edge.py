@@ -117,6 +117,49 @@ def test_ends_that_disagree_do_not_hide_an_edge() -> None:
     assert after.contradicts_static == pytest.approx(6 / 7)
 
 
+def test_ends_off_the_edge_contradict_as_before() -> None:
+    """Two limbs beside a seam: they swing along it, but they are not on it."""
+    at_m = np.concatenate((HORIZONTAL, [[-0.3, 0.6], [0.3, 0.6]]))
+    went_m = np.concatenate((np.tile([0.1, 0.0], (6, 1)), np.tile([0.14, 0.0], (2, 1))))
+    before, after = before_and_after(at_m, went_m)
+    assert before.agreement == pytest.approx(6 / 8)
+    assert after.contradicts_static == pytest.approx(2 / 8)
+
+
+@pytest.mark.parametrize(("chi2_far", "contradicts"), [(13.0, 0.0), (14.0, 1.0)])
+def test_what_did_not_contradict_before_does_not_now(chi2_far: float, contradicts: float) -> None:
+    """Across the edge by 25 sigmas of the near surface, but of static_chi2 the far one says so."""
+    motion = replace(ends_4m_away(HORIZONTAL, np.tile([0.0, 0.1], (6, 1))), static_chi2=np.full(6, chi2_far))
+    owner = np.zeros(6, np.intp)
+    body = body_velocities(motion, fragment_velocities(motion, 1.5).per_end, owner, 1, np.zeros((1, 3)), 1.5)
+    assert one_edge.without_way_along(body, motion, owner, FOCAL_PX).contradicts_static == contradicts
+
+
+@pytest.mark.parametrize(("across_px", "contradicts"), [(3.2, 0.0), (3.4, 1.0)])
+@pytest.mark.parametrize("angle_deg", [30.0, -50.0])
+def test_an_aslant_edge_beside_the_centre_known_better_across_than_along(
+    angle_deg: float, across_px: float, contradicts: float
+) -> None:
+    """One pixel across the edge and ten along it: 3.29 sigmas across are 10.8 of chi-square."""
+    c, s = np.cos(np.radians(angle_deg)), np.sin(np.radians(angle_deg))
+    edge = HORIZONTAL @ np.array([[c, s], [-s, c]]) + [1.5, 0.8]
+    motion = ends_4m_away(edge, np.tile(np.array([-s, c]) * across_px * PX_M, (6, 1)))
+    along, across = (10.0 * PX_M) ** 2, PX_M**2
+    entries = [c * c * along + s * s * across, c * s * (along - across), s * s * along + c * c * across]
+    motion = replace(motion, covariance=np.tile(entries, (6, 1)))
+    owner = np.zeros(6, np.intp)
+    body = body_velocities(motion, fragment_velocities(motion, 1.5).per_end, owner, 1, np.zeros((1, 3)), 1.5)
+    after = one_edge.without_way_along(body, motion, owner, FOCAL_PX)
+    assert after.contradicts_static == contradicts
+    sight = np.array([1.5, 0.8, 4.0]) / np.linalg.norm([1.5, 0.8, 4.0])
+    added = after.covariance[0] - body.covariance[0]
+    # 3 m/s each along the sight and along the edge, whose directions are not quite at right angles.
+    assert np.trace(added) == pytest.approx(2 * 3.0**2, rel=1e-3)
+    assert sight @ added @ sight >= 3.0**2
+    normal = np.cross(sight, [c, s, 0.0])
+    assert normal @ added @ normal == pytest.approx(0.0, abs=1e-3)
+
+
 def test_other_bodies_and_ends_of_none_are_left_alone() -> None:
     """Beside a body on one edge: one with corners, and an edge that belongs to no body."""
     corners = np.array([[1.0, -0.3], [1.4, 0.3], [1.0, 0.3], [1.4, -0.3]])
